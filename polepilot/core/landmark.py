@@ -1,0 +1,110 @@
+"""Barcode poles: their code and their size.
+
+A code has 2n+5 segments of equal length, read from the top: two of the bright colour, then
+``0 b0 0 b1 0 ... b(n-1) 0`` with the least significant bit nearest the top, then two bright ones
+(paper, "Landmark" and Fig. 5). Orange is 1 and black is 0; the one sentence of the paper that
+says the opposite contradicts its own figure and example.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from polepilot.core.errors import InputError
+from polepilot.core.geometry import Point
+
+SUPPORTED_BITS = (4, 5, 6, 8)
+Shape = Literal["cylinder", "flat"]
+
+
+def encode(landmark_id: int, bits: int = 4) -> str:
+    """The segment string of an id, top first: ``encode(13) == "1101000101011"``.
+
+    Raises:
+        InputError: the id does not fit into ``bits``, or ``bits`` is not supported.
+    """
+    _check_bits(bits)
+    if not 1 <= landmark_id < 2**bits:
+        raise InputError(
+            f"landmark id {landmark_id} does not fit into {bits} bits: expected 1 to {2**bits - 1}."
+        )
+    middle = "0".join(str(landmark_id >> bit & 1) for bit in range(bits))
+    return f"110{middle}011"
+
+
+def decode(code: str) -> int | None:
+    """The id of a segment string (top first), or None where it is no legal code.
+
+    The number of bits follows from the length. Id 0 is not used and is no legal code.
+    """
+    bits, odd = divmod(len(code) - 5, 2)
+    if odd or bits not in SUPPORTED_BITS or set(code) - {"0", "1"}:
+        return None
+    middle = code[2:-2]
+    if code[:2] != "11" or code[-2:] != "11" or "1" in middle[::2]:
+        return None
+    return int(middle[1::2][::-1], 2) or None
+
+
+@dataclass(frozen=True, slots=True)
+class LandmarkKind:
+    """What the landmarks of a site look like; lengths in metres."""
+
+    bits: int = 4
+    segment: float = 0.05
+    """Length of one segment."""
+    diameter: float = 0.07
+    """Thickness of a cylinder, width of a flat sticker."""
+    shape: Shape = "cylinder"
+
+    def __post_init__(self) -> None:
+        _check_bits(self.bits)
+        if not 0.002 <= self.segment <= 10:
+            raise InputError(f"segment is {self.segment} m: expected 0.002 to 10 m.")
+        if not 0.002 <= self.diameter <= 10:
+            raise InputError(f"diameter is {self.diameter} m: expected 0.002 to 10 m.")
+        if self.shape not in ("cylinder", "flat"):
+            raise InputError(f"shape is {self.shape!r}: expected 'cylinder' or 'flat'.")
+
+    @property
+    def segments(self) -> int:
+        """How many segments the code has: 2n+5."""
+        return 2 * self.bits + 5
+
+    @property
+    def height(self) -> float:
+        """Length of the whole code, metres: the h1 of Eq. 1."""
+        return self.segments * self.segment
+
+    @property
+    def axis_depth(self) -> float:
+        """How far the axis lies behind the surface that the camera sees, metres."""
+        return self.diameter / 2 if self.shape == "cylinder" else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Landmark:
+    """One pole of a site: number, place of its axis in `map`, and what it looks like."""
+
+    id: int
+    x: float
+    y: float
+    kind: LandmarkKind = field(default_factory=LandmarkKind)
+
+    def __post_init__(self) -> None:
+        encode(self.id, self.kind.bits)
+
+    @property
+    def position(self) -> Point:
+        return (self.x, self.y)
+
+    @property
+    def code(self) -> str:
+        """Its segment string, top first."""
+        return encode(self.id, self.kind.bits)
+
+
+def _check_bits(bits: int) -> None:
+    if bits not in SUPPORTED_BITS:
+        raise InputError(f"bits is {bits}: expected one of {SUPPORTED_BITS}.")

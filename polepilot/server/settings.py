@@ -1,0 +1,186 @@
+"""robot.toml: one file that says what this robot is.
+
+Every key has a default, which is the simulated robot, so an absent file is a valid one. Names carry
+their unit; everything is SI (radians, not degrees) because other programs read this file too.
+What cannot be used is refused with one line: file, line number, key, what was read, what was
+expected.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError, model_validator
+
+from polepilot.core.errors import ConfigError
+from polepilot.core.landmark import LandmarkKind
+from polepilot.core.vehicle import Camera, PanUnit, Proximity, RobotModel, Vehicle
+from polepilot.server.settings_errors import explain_syntax, explain_validation, refusal
+from polepilot.server.settings_sections import (
+    CameraSettings,
+    DriveSettings,
+    LandmarkSettings,
+    LimitSettings,
+    LinkSettings,
+    LocalizerSettings,
+    PanSettings,
+    ProximitySettings,
+    Section,
+    ServerSettings,
+    SimulationSettings,
+    VehicleSettings,
+)
+
+
+class Settings(Section):
+    """The whole of robot.toml."""
+
+    camera: CameraSettings = CameraSettings()
+    pan: PanSettings = PanSettings()
+    vehicle: VehicleSettings = VehicleSettings()
+    landmark: LandmarkSettings = LandmarkSettings()
+    link: LinkSettings = LinkSettings()
+    drive: DriveSettings = DriveSettings()
+    localizer: LocalizerSettings = LocalizerSettings()
+    limits: LimitSettings = LimitSettings()
+    proximity: ProximitySettings = ProximitySettings()
+    simulation: SimulationSettings = SimulationSettings()
+    server: ServerSettings = ServerSettings()
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Settings:
+        if self.camera.source == "simulated" and self.link.board == "serial":
+            raise refusal(
+                "camera.source", "simulated", 'a real camera, because link.board is "serial"'
+            )
+        if self.camera.source != "simulated" and self.link.board == "simulated":
+            raise refusal(
+                "camera.source", self.camera.source, '"simulated", as long as link.board is that'
+            )
+        return self
+
+    @property
+    def model(self) -> RobotModel:
+        """The robot's body as the core knows it."""
+        return RobotModel(
+            vehicle=Vehicle(
+                wheelbase=self.vehicle.wheelbase_m,
+                track=self.vehicle.track_m,
+                body_radius=self.vehicle.body_radius_m,
+                max_steering=self.vehicle.max_steering_rad,
+                steering_rate=self.vehicle.steering_rate_rad_s,
+                max_speed=min(self.vehicle.max_speed_m_s, self.limits.max_speed_m_s),
+                max_acceleration=self.vehicle.max_acceleration_m_s2,
+                tool_width=self.vehicle.tool_width_m,
+                clearance=self.vehicle.clearance_m,
+                turn_radius_margin=self.vehicle.turn_radius_margin,
+            ),
+            camera=Camera(
+                constant=self.camera.constant_px,
+                width=self.camera.width,
+                height=self.camera.height,
+                center_x=self.camera.center[0],
+                center_y=self.camera.center[1],
+                forward=self.camera.forward_m,
+                mount_height=self.camera.height_m,
+                rate=self.camera.rate_hz,
+            ),
+            pan=PanUnit(
+                minimum=self.pan.minimum_rad,
+                maximum=self.pan.maximum_rad,
+                rate=self.pan.rate_rad_s,
+                sweep_duty=self.pan.sweep_duty,
+                adc_at_minimum=self.pan.adc_at_minimum,
+                adc_at_maximum=self.pan.adc_at_maximum,
+            ),
+            proximity=Proximity(
+                angles=self.proximity.angles_rad,
+                forward=self.proximity.forward_m,
+                max_range=self.proximity.max_range_m,
+                hard_limit=self.proximity.hard_limit_m,
+            ),
+        )
+
+    @property
+    def landmark_kind(self) -> LandmarkKind:
+        """What a landmark looks like where the site does not say."""
+        return LandmarkKind(
+            bits=self.landmark.bits,
+            segment=self.landmark.segment_m,
+            diameter=self.landmark.diameter_m,
+            shape=self.landmark.shape,
+        )
+
+    def with_board(self, board: str) -> Settings:
+        """These settings for another board, as ``serve --board`` asks for.
+
+        The simulated board comes with the simulated camera: there is no half-simulated world.
+
+        Raises:
+            ConfigError: the board is unknown, or "serial" without a port or a real camera.
+        """
+        changes: dict[str, dict[str, Any]] = {"link": {"board": board}}
+        if board == "simulated":
+            changes["camera"] = {"source": "simulated"}
+        return self.override(changes, "--board")
+
+    def override(self, changes: Mapping[str, Mapping[str, Any]], source: str) -> Settings:
+        """These settings with some keys changed, checked again: ``{"link": {"board": ...}}``.
+
+        Args:
+            source: where the changes come from ("--board"), for the error's sentence.
+
+        Raises:
+            ConfigError: the result cannot be used.
+        """
+        document = self.model_dump()
+        for section, keys in changes.items():
+            document[section] = {**document.get(section, {}), **keys}
+        return _validated(document, source, "")
+
+
+def load_settings(path: Path | None) -> Settings:
+    """Read robot.toml; ``None`` gives the defaults, the simulated robot.
+
+    Raises:
+        ConfigError: the file is missing or unreadable, is no TOML, has an unknown key, or a value
+            that cannot be used. One line: file, line, key, what was read, what was expected.
+    """
+    if path is None:
+        return Settings()
+    try:
+        text = path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        raise ConfigError(
+            f"{path}: byte {error.start} is no UTF-8 text: expected a TOML file."
+        ) from error
+    except OSError as error:
+        why = error.strerror or type(error).__name__
+        raise ConfigError(
+            f"{path}: cannot be read ({why}): expected a robot.toml.",
+            remedy="See robot.example.toml.",
+        ) from error
+    return parse_settings(text, str(path))
+
+
+def parse_settings(text: str, source: str) -> Settings:
+    """The settings in ``text``, a TOML document that came from ``source``.
+
+    Raises:
+        ConfigError: as ``load_settings``.
+    """
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(explain_syntax(error, source)) from error
+    return _validated(document, source, text)
+
+
+def _validated(document: dict[str, Any], source: str, text: str) -> Settings:
+    try:
+        return Settings.model_validate(document)
+    except ValidationError as error:
+        raise ConfigError(explain_validation(error, source, text, Settings)) from error

@@ -1,0 +1,376 @@
+"""The sections of robot.toml: every key with its default, range, unit and meaning.
+
+Defaults come from the core's own, which describe the simulated robot. The documentation's table and
+robot.example.toml are held against these classes by tests.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from polepilot.core.landmark import LandmarkKind
+from polepilot.core.vehicle import Camera, PanUnit, Proximity, Vehicle
+from polepilot.server.settings_errors import refusal
+
+_VEHICLE, _CAMERA, _PAN, _PROXIMITY = Vehicle(), Camera(), PanUnit(), Proximity()
+_LANDMARK = LandmarkKind()
+
+Pair = Annotated[tuple[float, float], Field(strict=False)]
+Triple = Annotated[tuple[float, float, float], Field(strict=False)]
+
+
+class Section(BaseModel):
+    """One table of the file: strict types (no "400" for 400), no unknown key, no inf or nan."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+class CameraSettings(Section):
+    """Where pictures come from, and the lens."""
+
+    source: int | str = Field(
+        default="simulated",
+        description='"simulated", a device (0 or "/dev/video0"), an rtsp:// or http:// address, '
+        "a video file or a folder of pictures",
+    )
+    constant_px: float = Field(
+        default=_CAMERA.constant,
+        gt=1,
+        description="camera constant for width x height pictures, pixels",
+    )
+    width: int = Field(default=_CAMERA.width, ge=32, le=8192, description="columns of a picture")
+    height: int = Field(default=_CAMERA.height, ge=32, le=8192, description="rows of a picture")
+    center: Pair = Field(
+        default=(_CAMERA.center_x, _CAMERA.center_y),
+        description="column and row of the optical axis; without it the middle of the picture",
+    )
+    forward_m: float = Field(
+        default=_CAMERA.forward, description="pan axis ahead of the rear axle, metres"
+    )
+    height_m: float = Field(
+        default=_CAMERA.mount_height, gt=0, description="lens above the floor, metres"
+    )
+    rate_hz: float = Field(
+        default=_CAMERA.rate, gt=0, le=240, description="pictures per second asked for"
+    )
+    capture_width: int = Field(
+        default=1600,
+        ge=32,
+        le=8192,
+        description="columns asked of a device; the picture is averaged down from these",
+    )
+    capture_height: int = Field(default=1200, ge=32, le=8192, description="rows asked of a device")
+    latency_s: float = Field(
+        default=0.05, ge=0, le=5, description="from mid exposure to the picture's arrival, seconds"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _center_follows_size(cls, data: Any) -> Any:
+        if isinstance(data, Mapping) and "center" not in data:
+            width = data.get("width", _CAMERA.width)
+            height = data.get("height", _CAMERA.height)
+            if isinstance(width, int) and isinstance(height, int):
+                return {**data, "center": ((width - 1) / 2, (height - 1) / 2)}
+        return data
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> CameraSettings:
+        if not (0 <= self.center[0] < self.width and 0 <= self.center[1] < self.height):
+            raise refusal(
+                "center", list(self.center), f"a place inside {self.width}x{self.height} pixels"
+            )
+        if isinstance(self.source, int) and self.source < 0:
+            raise refusal("source", self.source, "a device number of 0 or more")
+        if self.source == "":
+            raise refusal("source", self.source, '"simulated", a device, an address or a file')
+        return self
+
+
+class PanSettings(Section):
+    """The motor that turns the camera, and its potentiometer."""
+
+    minimum_rad: float = Field(
+        default=_PAN.minimum, ge=-math.tau, le=math.tau, description="end at the right, radians"
+    )
+    maximum_rad: float = Field(
+        default=_PAN.maximum, ge=-math.tau, le=math.tau, description="end at the left, radians"
+    )
+    rate_rad_s: float = Field(
+        default=_PAN.rate, gt=0, description="rate at full duty, radians per second"
+    )
+    sweep_duty: float = Field(
+        default=_PAN.sweep_duty, gt=0, le=1, description="share of the full duty while sweeping"
+    )
+    adc_at_minimum: int = Field(
+        default=_PAN.adc_at_minimum,
+        ge=0,
+        le=65535,
+        description="potentiometer counts at minimum_rad",
+    )
+    adc_at_maximum: int = Field(
+        default=_PAN.adc_at_maximum,
+        ge=0,
+        le=65535,
+        description="potentiometer counts at maximum_rad",
+    )
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> PanSettings:
+        if self.minimum_rad >= self.maximum_rad:
+            raise refusal(
+                "minimum_rad", self.minimum_rad, f"less than maximum_rad ({self.maximum_rad})"
+            )
+        if self.adc_at_minimum == self.adc_at_maximum:
+            raise refusal(
+                "adc_at_maximum", self.adc_at_maximum, "another number than adc_at_minimum"
+            )
+        return self
+
+
+class VehicleSettings(Section):
+    """Wheels and body, and what plans use where nobody says otherwise."""
+
+    wheelbase_m: float = Field(
+        default=_VEHICLE.wheelbase, gt=0, le=10, description="rear axle to front axle, metres"
+    )
+    track_m: float = Field(
+        default=_VEHICLE.track, gt=0, le=10, description="between the rear wheels, metres"
+    )
+    body_radius_m: float = Field(
+        default=_VEHICLE.body_radius,
+        gt=0,
+        le=20,
+        description="disc around the middle of the rear axle that holds the whole body, metres",
+    )
+    max_steering_rad: float = Field(
+        default=_VEHICLE.max_steering,
+        gt=0,
+        lt=math.pi / 2,
+        description="of the virtual front wheel to either side, radians",
+    )
+    steering_rate_rad_s: float = Field(
+        default=_VEHICLE.steering_rate,
+        gt=0,
+        description="how fast the servo turns, radians per second",
+    )
+    max_speed_m_s: float = Field(
+        default=_VEHICLE.max_speed, gt=0, le=10, description="metres per second, at most"
+    )
+    max_acceleration_m_s2: float = Field(
+        default=_VEHICLE.max_acceleration,
+        gt=0,
+        le=50,
+        description="metres per second squared, at most",
+    )
+    tool_width_m: float = Field(
+        default=_VEHICLE.tool_width,
+        gt=0,
+        le=20,
+        description="width of the strip that one pass covers",
+    )
+    clearance_m: float = Field(
+        default=_VEHICLE.clearance,
+        ge=0,
+        le=20,
+        description="how near the path may come to a wall, metres",
+    )
+    turn_radius_margin: float = Field(
+        default=_VEHICLE.turn_radius_margin,
+        ge=1,
+        le=20,
+        description="plans turn no tighter than this times the tightest turn",
+    )
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> VehicleSettings:
+        if self.clearance_m < self.body_radius_m:
+            raise refusal(
+                "clearance_m",
+                self.clearance_m,
+                f"at least body_radius_m ({self.body_radius_m}), or the body touches walls",
+            )
+        return self
+
+
+class LandmarkSettings(Section):
+    """What landmarks look like where a site does not say otherwise, and who reads them."""
+
+    bits: Literal[4, 5, 6, 8] = Field(default=4, description="bits of the code: 4, 5, 6 or 8")
+    segment_m: float = Field(
+        default=_LANDMARK.segment, ge=0.002, le=10, description="length of one segment, metres"
+    )
+    diameter_m: float = Field(
+        default=_LANDMARK.diameter,
+        ge=0.002,
+        le=10,
+        description="thickness of a pole, or width of a flat sticker, metres",
+    )
+    shape: Literal["cylinder", "flat"] = Field(
+        default="cylinder", description='"cylinder" or "flat"'
+    )
+    detector: Literal["default", "paper"] = Field(
+        default="default", description='"default", or "paper" for the source paper\'s method'
+    )
+
+
+class LinkSettings(Section):
+    """The line to the microcontroller."""
+
+    board: Literal["simulated", "serial"] = Field(
+        default="simulated", description='"simulated", or "serial" for a board on USB'
+    )
+    port: str = Field(
+        default="", description='serial port such as "/dev/polepilot"; "" finds it by USB id'
+    )
+    usb_vendor: int = Field(default=0, ge=0, le=0xFFFF, description="USB vendor id; 0 is any")
+    usb_product: int = Field(default=0, ge=0, le=0xFFFF, description="USB product id; 0 is any")
+    usb_serial: str = Field(default="", description='USB serial number; "" is any')
+    baud: int = Field(default=115200, ge=1200, le=4_000_000, description="bits per second")
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> LinkSettings:
+        if self.board == "serial" and not (self.port or self.usb_vendor or self.usb_serial):
+            raise refusal("board", self.board, "link.port, link.usb_vendor or link.usb_serial too")
+        if self.usb_product and not self.usb_vendor:
+            raise refusal("usb_product", self.usb_product, "link.usb_vendor too")
+        return self
+
+
+class DriveSettings(Section):
+    """How duty becomes speed and servo angle becomes steering: this robot's calibration."""
+
+    full_speed_m_s: float = Field(
+        default=0.5, gt=0, le=20, description="speed at full duty, metres per second"
+    )
+    dead_band: float = Field(
+        default=0.0, ge=0, lt=1, description="share of the full duty below which the wheels stand"
+    )
+    trim_left: float = Field(default=1.0, gt=0, le=2, description="factor on the left motor's duty")
+    trim_right: float = Field(
+        default=1.0, gt=0, le=2, description="factor on the right motor's duty"
+    )
+    servo_center_rad: float = Field(
+        default=0.0, ge=-1.5, le=1.5, description="servo angle that drives straight, radians"
+    )
+    servo_range_rad: float = Field(
+        default=_VEHICLE.max_steering,
+        gt=0,
+        lt=math.pi / 2,
+        description="servo travel to either side",
+    )
+    encoder_counts_per_m: float = Field(
+        default=0.0, ge=0, description="wheel encoder counts per metre; 0 without encoders"
+    )
+
+
+class LocalizerSettings(Section):
+    """How the pose is found."""
+
+    method: Literal["ekf", "paper"] = Field(default="ekf", description='"ekf", or "paper"')
+    tolerance_m: float = Field(
+        default=0.20,
+        gt=0,
+        le=10,
+        description="a contradiction beyond this stops the robot to fix its pose anew, metres",
+    )
+
+
+class LimitSettings(Section):
+    """What the supervisor does not let pass."""
+
+    max_speed_m_s: float = Field(
+        default=_VEHICLE.max_speed,
+        gt=0,
+        le=10,
+        description="metres per second, whoever asks for more",
+    )
+    pose_age_s: float = Field(
+        default=0.5, gt=0, le=10, description="stop when the pose estimate is older, seconds"
+    )
+    landmark_age_s: float = Field(
+        default=8.0,
+        gt=0,
+        le=600,
+        description="stop when no landmark was seen for this long, seconds",
+    )
+    link_age_s: float = Field(
+        default=0.25, gt=0, le=5, description="stop when the last telemetry is older, seconds"
+    )
+    camera_age_s: float = Field(
+        default=2.0, gt=0, le=60, description="stop when the last picture is older, seconds"
+    )
+    position_sigma_m: float = Field(
+        default=0.25, gt=0, le=10, description="stop when the position is known no better, metres"
+    )
+    battery_v: float = Field(
+        default=0.0, ge=0, le=100, description="stop below this voltage; 0 does not look"
+    )
+
+
+class ProximitySettings(Section):
+    """The three range sensors at the front."""
+
+    angles_rad: Triple = Field(
+        default=_PROXIMITY.angles, description="directions of left, centre, right sensor, radians"
+    )
+    forward_m: float = Field(
+        default=_PROXIMITY.forward, description="sensors ahead of the rear axle, metres"
+    )
+    max_range_m: float = Field(
+        default=_PROXIMITY.max_range, gt=0, le=50, description="farthest reading, metres"
+    )
+    hard_limit_m: float = Field(
+        default=_PROXIMITY.hard_limit,
+        ge=0,
+        le=5,
+        description="nearer than this the firmware stops forward motion by itself, metres",
+    )
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> ProximitySettings:
+        if self.hard_limit_m >= self.max_range_m:
+            raise refusal(
+                "hard_limit_m", self.hard_limit_m, f"less than max_range_m ({self.max_range_m})"
+            )
+        left, centre, right = self.angles_rad
+        if not math.pi >= left > centre > right >= -math.pi:
+            raise refusal(
+                "angles_rad", list(self.angles_rad), "left, centre, right: falling, within one turn"
+            )
+        return self
+
+
+class SimulationSettings(Section):
+    """How imperfect the simulated robot is. Nothing here touches real hardware."""
+
+    seed: int = Field(default=1, ge=0, le=2**32 - 1, description="of all chance in the simulation")
+    sensing: Literal["rendered", "measured"] = Field(
+        default="rendered",
+        description='"rendered" pictures go through the detector; "measured" draws range and '
+        "bearing from its error model",
+    )
+    speed_scale_error: float = Field(
+        default=0.03, ge=0, le=0.5, description="largest share by which the true speed differs"
+    )
+    steering_offset_rad: float = Field(
+        default=math.radians(1), ge=0, le=0.5, description="largest steering misalignment, radians"
+    )
+    slip: float = Field(
+        default=0.01, ge=0, le=1, description="random share of the way lost to slip"
+    )
+
+
+class ServerSettings(Section):
+    """The web service. It listens on 127.0.0.1 alone."""
+
+    port: int = Field(default=8000, ge=0, le=65535, description="TCP port; 0 takes a free one")
+    data: str = Field(
+        default="",
+        description='folder for sites, plans and logs; "" is the usual place of the system',
+    )
+    panel: bool = Field(default=True, description="serve the 3D panel under /viser/")

@@ -6,7 +6,7 @@ Nothing above these protocols knows which of them it talks to.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from polepilot.core.observation import Detection, Frame
 
@@ -19,6 +19,13 @@ class Sighting:
     """Middle of the exposure of the middle row."""
     detections: tuple[Detection, ...]
     frame: Frame | None = None
+
+
+class Chunk(NamedTuple):
+    """Bytes that came together, and when: a tick reads them later, and pan angles are timed."""
+
+    stamp: float
+    data: bytes
 
 
 class CameraPort(Protocol):
@@ -52,8 +59,8 @@ class SensorPort(Protocol):
 class LinkPort(Protocol):
     """A byte stream to the microcontroller."""
 
-    def read(self) -> bytes:
-        """All bytes that have come since the last call, perhaps none; never blocks.
+    def read(self) -> list[Chunk]:
+        """What has come since the last call, oldest first, perhaps nothing; never blocks.
 
         Raises:
             LinkError: the line is gone; the next call may find it again.

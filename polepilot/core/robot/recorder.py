@@ -1,0 +1,163 @@
+"""The log of one run: an MCAP file with JSON messages, written while the robot drives.
+
+Channels: ``site`` and ``plan`` once at the start, ``snapshot`` every tick (each computed position),
+``sighting`` per picture, ``picture`` (JPEG) once a second, ``event`` when something happens,
+``result`` at the end. A reader that streams the file gets everything up to a power cut.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import threading
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any
+
+import cv2
+from mcap.writer import CompressionType, Writer
+
+from polepilot.core.geometry import Pose2D
+from polepilot.core.observation import Frame, RangeBearing
+from polepilot.core.plan import Plan
+from polepilot.core.robot.snapshot import Event, Snapshot
+from polepilot.core.site import Site
+
+CHUNK_BYTES = 32 * 1024
+"""A power cut loses at most the last chunk."""
+PICTURE_PERIOD = 1.0
+"""Seconds between two recorded pictures."""
+
+_Message = tuple[str, int, bytes]
+
+
+class Recorder:
+    """Writes a run's messages from a thread of its own, so that a slow disk never stops a tick."""
+
+    def __init__(self, path: Path, *, wall_start: float = 0.0, stamp_start: float = 0.0) -> None:
+        """Open ``path`` for a run that began at unix time ``wall_start``, robot time
+        ``stamp_start``; robot stamps are kept in the messages' ``t``."""
+        self._path = path
+        self._offset = wall_start - stamp_start
+        self._queue: SimpleQueue[_Message | None] = SimpleQueue()
+        self._next_picture = -1.0
+        self.error: OSError | None = None
+        """Why the log is incomplete, once writing has failed (a full disk, say)."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._thread = threading.Thread(target=self._write_all, name="recorder", daemon=True)
+        self._thread.start()
+
+    def begin(self, stamp: float, site: Site, plan: Plan) -> None:
+        """What the run is about."""
+        self._put("site", stamp, site.to_json())
+        self._put("plan", stamp, {"mode": plan.mode, **plan.to_json()})
+
+    def snapshot(self, snapshot: Snapshot, truth: Pose2D | None) -> None:
+        """One tick. ``truth`` is known in simulation only."""
+        estimate, measured = snapshot.estimate, snapshot.measured
+        mission = snapshot.mission
+        self._put(
+            "snapshot",
+            snapshot.stamp,
+            {
+                "t": _round(snapshot.stamp),
+                "state": snapshot.state,
+                "reason": snapshot.reason,
+                "estimated": None
+                if estimate is None
+                else [*_pose(estimate.pose), _round(estimate.position_sigma)],
+                "covariance": None
+                if estimate is None
+                else [float(f"{value:.4g}") for value in estimate.covariance[_UPPER]],
+                "measured": None
+                if measured is None
+                else [_round(measured.stamp), *_pose(measured.pose)],
+                "target": None if snapshot.target is None else [_round(v) for v in snapshot.target],
+                "real": None if truth is None else _pose(truth),
+                "command": [_round(snapshot.command.speed), _round(snapshot.command.steering)],
+                "pan": None if snapshot.pan is None else _round(snapshot.pan),
+                "proximity": snapshot.proximity,
+                "progress": None if mission is None else _round(mission.progress),
+                "coverage": None if mission is None else mission.coverage,
+            },
+        )
+
+    def sighting(
+        self, stamp: float, measurements: list[RangeBearing], frame: Frame | None
+    ) -> None:
+        """What one picture gave, and now and then the picture itself."""
+        if measurements:
+            self._put(
+                "sighting",
+                stamp,
+                {
+                    "t": _round(stamp),
+                    "measurements": [
+                        {
+                            "landmark": m.landmark,
+                            "range": _round(m.range),
+                            "bearing": _round(m.bearing),
+                            "range_sigma": float(f"{m.range_sigma:.3g}"),
+                            "bearing_sigma": float(f"{m.bearing_sigma:.3g}"),
+                        }
+                        for m in measurements
+                    ],
+                },
+            )
+        if frame is not None and stamp >= self._next_picture:
+            self._next_picture = stamp + PICTURE_PERIOD
+            done, jpeg = cv2.imencode(".jpg", frame.image, [cv2.IMWRITE_JPEG_QUALITY, 80])
+            if done:
+                data = base64.b64encode(jpeg.tobytes()).decode("ascii")
+                self._put("picture", stamp, {"t": _round(stamp), "format": "jpeg", "data": data})
+
+    def event(self, event: Event) -> None:
+        """Something that happened."""
+        document = {
+            "t": _round(event.stamp),
+            "code": event.code,
+            "level": event.level,
+            "text": event.text,
+        }
+        self._put("event", event.stamp, document)
+
+    def result(self, stamp: float, document: dict[str, Any]) -> None:
+        """How the run ended."""
+        self._put("result", stamp, document)
+
+    def close(self) -> None:
+        """Write what is still queued and finish the file."""
+        self._queue.put(None)
+        self._thread.join()
+
+    def _put(self, channel: str, stamp: float, document: dict[str, Any]) -> None:
+        if self.error is None:
+            data = json.dumps(document, separators=(",", ":")).encode()
+            self._queue.put((channel, max(0, int((stamp + self._offset) * 1e9)), data))
+
+    def _write_all(self) -> None:
+        try:
+            with self._path.open("wb") as file:
+                writer = Writer(file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+                writer.start(profile="", library="polepilot")
+                channels: dict[str, int] = {}
+                while (message := self._queue.get()) is not None:
+                    name, nanoseconds, data = message
+                    if name not in channels:
+                        schema = writer.register_schema(name, "jsonschema", b'{"type":"object"}')
+                        channels[name] = writer.register_channel(name, "json", schema)
+                    writer.add_message(channels[name], nanoseconds, data, nanoseconds)
+                writer.finish()
+        except OSError as error:
+            self.error = error
+
+
+_UPPER = ([0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2])
+
+
+def _round(value: float) -> float:
+    return round(float(value), 4)
+
+
+def _pose(pose: Pose2D) -> list[float]:
+    return [_round(pose.x), _round(pose.y), _round(pose.heading)]

@@ -1,0 +1,95 @@
+"""Bringing what was sensed at different moments onto one clock."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections import deque
+
+from polepilot.core.observation import PanReading
+
+DRIFT = 200e-6
+"""How far a crystal of the microcontroller may run off, seconds per second."""
+MCU_WRAP = 2**32 / 1000
+"""The microcontroller's milliseconds start again after this many seconds."""
+
+
+class BoardClock:
+    """Robot time of what the microcontroller stamped with its own milliseconds.
+
+    A packet is received some time after it was stamped, never before, so the smallest
+    difference seen is the best estimate of the offset; it may creep up by the clocks' drift.
+    """
+
+    def __init__(self) -> None:
+        self._offset: float | None = None
+        self._last = 0.0
+
+    def to_robot(self, board_ms: int, received: float) -> float:
+        """The stamp in robot time; never later than ``received``."""
+        board = board_ms / 1000
+        offset = received - board
+        if (
+            self._offset is None
+            or board < self._last
+            or abs(offset - self._offset) > 1.0
+        ):  # first packet, wrap around, or a board that was reset
+            self._offset = offset
+        else:
+            self._offset = min(offset, self._offset + DRIFT * (board - self._last))
+        self._last = board
+        return min(board + self._offset, received)
+
+
+class PanTrack:
+    """The last second of pan readings, to ask where the camera pointed during an exposure."""
+
+    def __init__(self, keep: float = 1.0) -> None:
+        self._keep = keep
+        self._stamps: deque[float] = deque()
+        self._angles: deque[float] = deque()
+
+    def add(self, reading: PanReading) -> None:
+        """Readings that are not newer than the last one are ignored."""
+        if self._stamps and reading.stamp <= self._stamps[-1]:
+            return
+        self._stamps.append(reading.stamp)
+        self._angles.append(reading.angle)
+        while self._stamps[0] < reading.stamp - self._keep:
+            self._stamps.popleft()
+            self._angles.popleft()
+
+    @property
+    def latest(self) -> PanReading | None:
+        if not self._stamps:
+            return None
+        return PanReading(self._stamps[-1], self._angles[-1])
+
+    def at(self, stamp: float) -> float | None:
+        """The angle at ``stamp``, interpolated; None outside of the readings that are kept."""
+        if not self._stamps or not self._stamps[0] <= stamp <= self._stamps[-1]:
+            return None
+        after = bisect_right(self._stamps, stamp)
+        if after == len(self._stamps):
+            return self._angles[-1]
+        t0, t1 = self._stamps[after - 1], self._stamps[after]
+        share = (stamp - t0) / (t1 - t0)
+        return self._angles[after - 1] + share * (self._angles[after] - self._angles[after - 1])
+
+
+class PanSweep:
+    """Turns the camera to and fro (paper, "camera rotation"): full duty one way, then the other."""
+
+    def __init__(self, minimum: float, maximum: float, duty: float, margin: float = 0.06) -> None:
+        self._low, self._high = minimum + margin, maximum - margin
+        self._duty = duty
+        self._direction = 1.0
+
+    def rate(self, angle: float | None) -> float:
+        """The duty to ask for, -1 to 1, with the camera at ``angle``; 0 while that is unknown."""
+        if angle is None:
+            return 0.0
+        if angle >= self._high:
+            self._direction = -1.0
+        elif angle <= self._low:
+            self._direction = 1.0
+        return self._direction * self._duty

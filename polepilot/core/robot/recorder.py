@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import json
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -34,10 +35,21 @@ _Message = tuple[str, int, bytes]
 class Recorder:
     """Writes a run's messages from a thread of its own, so that a slow disk never stops a tick."""
 
-    def __init__(self, path: Path, *, wall_start: float = 0.0, stamp_start: float = 0.0) -> None:
+    def __init__(
+        self,
+        path: Path,
+        *,
+        wall_start: float = 0.0,
+        stamp_start: float = 0.0,
+        witness: Callable[[], Pose2D] | None = None,
+    ) -> None:
         """Open ``path`` for a run that began at unix time ``wall_start``, robot time
-        ``stamp_start``; robot stamps are kept in the messages' ``t``."""
+        ``stamp_start``; robot stamps are kept in the messages' ``t``.
+
+        ``witness`` tells the true pose, in simulation; the robot itself never sees it.
+        """
         self._path = path
+        self._witness = witness
         self._offset = wall_start - stamp_start
         self._queue: SimpleQueue[_Message | None] = SimpleQueue()
         self._next_picture = -1.0
@@ -52,8 +64,9 @@ class Recorder:
         self._put("site", stamp, site.to_json())
         self._put("plan", stamp, {"mode": plan.mode, **plan.to_json()})
 
-    def snapshot(self, snapshot: Snapshot, truth: Pose2D | None) -> None:
-        """One tick. ``truth`` is known in simulation only."""
+    def snapshot(self, snapshot: Snapshot) -> None:
+        """One tick."""
+        truth = None if self._witness is None else self._witness()
         estimate, measured = snapshot.estimate, snapshot.measured
         mission = snapshot.mission
         self._put(
@@ -125,10 +138,11 @@ class Recorder:
         """How the run ended."""
         self._put("result", stamp, document)
 
-    def close(self) -> None:
-        """Write what is still queued and finish the file."""
+    def close(self, *, wait: bool = True) -> None:
+        """Write what is still queued and finish the file, in the background if not ``wait``."""
         self._queue.put(None)
-        self._thread.join()
+        if wait:
+            self._thread.join()
 
     def _put(self, channel: str, stamp: float, document: dict[str, Any]) -> None:
         if self.error is None:

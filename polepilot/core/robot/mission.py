@@ -1,0 +1,167 @@
+"""A plan being executed: where to drive next, what has been swept, how far it has got."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from shapely import MultiPolygon
+from shapely.geometry import mapping
+
+from polepilot.core.command import STAND, DriveCommand
+from polepilot.core.control.avoidance import ObstacleAvoidance
+from polepilot.core.control.tracker import PathTracker
+from polepilot.core.geometry import Point, Pose2D
+from polepilot.core.observation import PoseEstimate
+from polepilot.core.plan import Mode, Plan
+from polepilot.core.planning.swept import SweptArea
+from polepilot.core.robot.recorder import Recorder
+from polepilot.core.robot.snapshot import MissionStatus
+from polepilot.core.site import Site
+from polepilot.core.vehicle import RobotModel
+
+Outcome = Literal["done", "paused", "failed", "timeout"]
+
+SWEEP_STEP = 0.02
+"""The swept area grows by strokes of at least this length, metres."""
+JUMP = 0.5
+"""A pose that moves farther than this between two ticks was corrected, not driven; metres."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunSummary:
+    """How a run ended. Areas in `map`; ``missed`` is what a next plan has to sweep."""
+
+    run_id: int
+    mode: Mode
+    outcome: Outcome
+    reason: str
+    coverage: float | None
+    travelled: float
+    duration: float
+    missed: MultiPolygon
+
+    def to_json(self) -> dict[str, Any]:
+        """The ``result`` message of the log."""
+        return {
+            "outcome": self.outcome,
+            "reason": self.reason,
+            "coverage": self.coverage,
+            "travelled": self.travelled,
+            "duration": self.duration,
+            "missed": mapping(self.missed)["coordinates"],
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What the mission wants in this tick, and why it stands if it does."""
+
+    command: DriveCommand
+    target: Point | None
+    hold: str = ""
+
+
+class Mission:
+    """One run of one plan. Time comes in as ``now``; only ticks that drive count as progress."""
+
+    def __init__(
+        self, run_id: int, plan: Plan, site: Site, model: RobotModel, recorder: Recorder, now: float
+    ) -> None:
+        self.run_id = run_id
+        self.plan = plan
+        self.site = site
+        self.recorder = recorder
+        self._started = now
+        self._tracker = PathTracker(plan, model.vehicle)
+        self._avoidance = ObstacleAvoidance(model.proximity, model.vehicle, site)
+        self._swept = None if plan.area.is_empty else SweptArea(plan.area, plan.tool_width)
+        self._stroke_from: Point | None = None
+        self._last: Pose2D | None = None
+        self._travelled = 0.0
+
+    @property
+    def done(self) -> bool:
+        """The whole path has been driven."""
+        return self._tracker.done
+
+    @property
+    def off_route(self) -> bool:
+        """Too far from the path to drive back to it unasked."""
+        return self._tracker.off_route
+
+    @property
+    def off_route_reason(self) -> str:
+        """Why, for a person."""
+        return self._tracker.off_route_reason
+
+    @property
+    def target(self) -> Point:
+        """The point being aimed at."""
+        return self._tracker.target
+
+    def drive(
+        self,
+        now: float,
+        dt: float,
+        estimate: PoseEstimate,
+        proximity: tuple[float | None, float | None, float | None],
+    ) -> Step:
+        """The command that follows the plan from ``estimate``, round obstacles."""
+        wanted = self._tracker.update(estimate.pose, dt)
+        if self.done:
+            return Step(STAND, self.target)
+        return self._avoid(now, estimate, proximity, wanted)
+
+    def observe(self, pose: Pose2D) -> None:
+        """Add where the robot is now to what it has swept and travelled."""
+        if self._last is not None:
+            moved = self._last.distance_to(pose.position)
+            if moved > JUMP:
+                self._stroke_from = None
+            else:
+                self._travelled += moved
+        self._last = pose
+        if self._stroke_from is None:
+            self._stroke_from = pose.position
+        elif pose.distance_to(self._stroke_from) >= SWEEP_STEP:
+            self._sweep_to(pose.position)
+
+    def status(self, now: float) -> MissionStatus:
+        """How far it has got."""
+        plan, swept = self.plan, self._swept
+        progress = min(1.0, self._tracker.progress / max(plan.predicted.length, 1e-9))
+        if self.done:
+            progress = 1.0
+        coverage = None if swept is None else swept.coverage
+        area = 0.0 if swept is None else plan.area.area
+        return MissionStatus(
+            run_id=self.run_id,
+            mode=plan.mode,
+            progress=progress,
+            travelled=self._travelled,
+            length=plan.predicted.length,
+            coverage=coverage,
+            swept_area=None if coverage is None else coverage * area,
+            missed_area=None if coverage is None else (1 - coverage) * area,
+            elapsed=now - self._started,
+            eta=(1 - progress) * plan.predicted.duration,
+        )
+
+    def summary(self, now: float, outcome: Outcome, reason: str) -> RunSummary:
+        """The record of this run."""
+        return RunSummary(
+            run_id=self.run_id,
+            mode=self.plan.mode,
+            outcome=outcome,
+            reason=reason,
+            coverage=None if self._swept is None else self._swept.coverage,
+            travelled=self._travelled,
+            duration=now - self._started,
+            missed=MultiPolygon() if self._swept is None else self._swept.missed(),
+        )
+
+    def _sweep_to(self, point: Point) -> None:
+        if self._swept is not None and self._stroke_from is not None:
+            self._swept.sweep(self._stroke_from, point)
+        self._stroke_from = point

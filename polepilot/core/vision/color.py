@@ -1,0 +1,84 @@
+"""From colours to light: one signal in which the bright paint stands out, and where it is bright.
+
+The bright colour (orange by default) is told from black by chromaticity, red minus blue, not by
+brightness: grey walls, shadows and highlights nearly vanish in it, whatever the light. Where a
+monochrome camera sees a bright/dark pair, grey itself is the signal.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from polepilot.core.observation import Image
+
+Floats = NDArray[np.float32]
+Bytes = NDArray[np.uint8]
+
+_NEIGHBOURHOOD = 13
+"""Rows in which the brightest pixel sets the threshold."""
+_BLOCK = 10
+"""Rows per block of the coarse neighbourhood."""
+_HALF_LIGHT = 0.70
+"""Half of the light as a share of the grey level: 0.5 ** (1/2.2) = 0.73, less the glow of black."""
+_COARSE_SHARE = 0.25
+"""What is darker than this share of the coarse neighbourhood's brightest is not the bright paint."""
+_FAINTEST = 10
+"""Grey levels of colour below which everything counts as black."""
+
+
+def contrast(image: Image) -> Bytes:
+    """The signal in grey levels, rows x columns: red minus blue, or grey as it is."""
+    if image.ndim == 2:
+        return image
+    signal: Bytes = cv2.subtract(cv2.extractChannel(image, 2), cv2.extractChannel(image, 0))
+    return signal
+
+
+def linear(patch: Image) -> Floats:
+    """The same signal in linear light (sRGB curve undone), 0 to 1, without clipping at zero.
+
+    Edges are found in linear light because pixels average light, not grey levels.
+    """
+    if patch.ndim == 2:
+        return _LINEAR[patch]
+    return _LINEAR[patch[:, :, 2]] - _LINEAR[patch[:, :, 0]]
+
+
+def bright(signal: Bytes) -> Bytes:
+    """Where the signal is at least half as bright as the brightest nearby in the same column.
+
+    Comparing along the column finds bright and black segments in dim and in glaring light alike,
+    at every distance, without knowing how bright the paint is. Returns 0 or 255 per pixel.
+    """
+    near = cv2.dilate(signal, np.ones((_NEIGHBOURHOOD, 1), np.uint8))
+    floor = np.maximum(_coarse(signal), _FAINTEST)
+    level = np.maximum(cv2.convertScaleAbs(near, alpha=_HALF_LIGHT), floor)
+    mask: Bytes = cv2.compare(signal, level, cv2.CMP_GT)
+    return mask
+
+
+def _coarse(signal: Bytes) -> Bytes:
+    """A share of the brightest value within about half of the picture's height, per pixel."""
+    rows, columns = signal.shape
+    blocks = -(-rows // _BLOCK)
+    padded = signal
+    if blocks * _BLOCK != rows:
+        padded = np.zeros((blocks * _BLOCK, columns), np.uint8)
+        padded[:rows] = signal
+    peak = padded.reshape(blocks, _BLOCK, columns).max(axis=1)
+    reach = blocks // 2 | 1
+    peak = cv2.dilate(peak, np.ones((reach, 1), np.uint8))
+    share = cv2.convertScaleAbs(peak, alpha=_COARSE_SHARE)
+    coarse: Bytes = np.repeat(share, _BLOCK, axis=0)[:rows]
+    return coarse
+
+
+def _linear_table() -> Floats:
+    grey = np.arange(256) / 255
+    curve = np.where(grey <= 0.04045, grey / 12.92, ((grey + 0.055) / 1.055) ** 2.4)
+    return curve.astype(np.float32)
+
+
+_LINEAR = _linear_table()

@@ -10,6 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from polepilot.core.command import STAND, DriveCommand
 from polepilot.core.control.supervisor import Limits, Supervisor, Verdict
@@ -19,7 +20,7 @@ from polepilot.core.link.calibration import DriveCalibration
 from polepilot.core.link.messages import Features
 from polepilot.core.link.protocol import HostLink, LinkState, TelemetrySample
 from polepilot.core.localization.localizer import Localizer, LocalizerSettings
-from polepilot.core.observation import Odometry, PanReading, PoseEstimate, RangeBearing, Status
+from polepilot.core.observation import PanReading, PoseEstimate, RangeBearing, Status
 from polepilot.core.plan import Plan
 from polepilot.core.robot.mission import Mission, Outcome, RunSummary
 from polepilot.core.robot.pan import PanSweep, PanTrack
@@ -360,9 +361,8 @@ class Robot:
         battery = None
         if telemetry is not None and self._host.features & Features.BATTERY:
             battery = telemetry.telemetry.battery_mv / 1000
-        end = self._stopwatch()
-        stages = [*marks, end]
-        durations = tuple(b - a for a, b in zip(stages, stages[1:], strict=False))
+        marks.append(self._stopwatch())
+        sample, locate, decide, act, publish = (b - a for a, b in pairwise(marks))
         return Snapshot(
             seq=self._seq,
             stamp=now,
@@ -380,7 +380,7 @@ class Robot:
             detections_stamp=None if sighting is None else sighting.stamp,
             mission=None if self._mission is None else self._mission.status(now),
             events=tuple(self._events),
-            durations=durations,  # type: ignore[arg-type]
+            durations=(sample, locate, decide, act, publish),
         )
 
     # ---- small questions ---------------------------------------------------------------------

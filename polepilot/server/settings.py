@@ -8,15 +8,20 @@ expected.
 
 from __future__ import annotations
 
+import dataclasses
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError, model_validator
 
 from polepilot.core.errors import ConfigError
 from polepilot.core.landmark import LandmarkKind
+from polepilot.core.link.calibration import DriveCalibration
+from polepilot.core.link.usb import PortAddress
+from polepilot.core.sim.motion import Disturbances
 from polepilot.core.vehicle import Camera, PanUnit, Proximity, RobotModel, Vehicle
 from polepilot.server.settings_errors import explain_syntax, explain_validation, refusal
 from polepilot.server.settings_sections import (
@@ -113,6 +118,36 @@ class Settings(Section):
             diameter=self.landmark.diameter_m,
             shape=self.landmark.shape,
         )
+
+    @property
+    def calibration(self) -> DriveCalibration:
+        """What this robot's motors and servo do."""
+        return DriveCalibration(
+            full_speed_left=self.drive.full_speed_left_m_s,
+            full_speed_right=self.drive.full_speed_right_m_s,
+            dead_band=self.drive.dead_band,
+            servo_center=self.drive.servo_center_rad,
+            servo_scale=self.drive.servo_scale,
+            servo_limit=self.drive.servo_limit_rad,
+            counts_per_metre=self.drive.counts_per_m,
+        )
+
+    @property
+    def port_address(self) -> PortAddress | None:
+        """Where the board is plugged in; None for the simulated one."""
+        return PortAddress.parse(self.link.port) if self.link.board == "serial" else None
+
+    def disturbances(self, rng: np.random.Generator) -> Disturbances:
+        """What the simulated robot does that its model does not know."""
+        drawn = Disturbances.drawn(rng)
+        factor = self.simulation.imperfection
+        # The grip says which wheels win, not how wrong they are.
+        scaled = {
+            field.name: getattr(drawn, field.name) * factor
+            for field in dataclasses.fields(drawn)
+            if field.name != "rear_grip"
+        }
+        return dataclasses.replace(drawn, **scaled)
 
     def with_board(self, board: str) -> Settings:
         """These settings for another board, as ``serve --board`` asks for.

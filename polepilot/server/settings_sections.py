@@ -12,12 +12,15 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from polepilot.core.errors import ConfigError
 from polepilot.core.landmark import LandmarkKind
+from polepilot.core.link.calibration import DriveCalibration
+from polepilot.core.link.usb import PortAddress
 from polepilot.core.vehicle import Camera, PanUnit, Proximity, Vehicle
 from polepilot.server.settings_errors import refusal
 
 _VEHICLE, _CAMERA, _PAN, _PROXIMITY = Vehicle(), Camera(), PanUnit(), Proximity()
-_LANDMARK = LandmarkKind()
+_LANDMARK, _DRIVE = LandmarkKind(), DriveCalibration()
 
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 Triple = Annotated[tuple[float, float, float], Field(strict=False)]
@@ -225,47 +228,82 @@ class LinkSettings(Section):
         default="simulated", description='"simulated", or "serial" for a board on USB'
     )
     port: str = Field(
-        default="", description='serial port such as "/dev/polepilot"; "" finds it by USB id'
+        default="",
+        description='"/dev/polepilot" or another path, or VID:PID[:SERIAL] in hexadecimal such as '
+        '"0403:6001"',
     )
-    usb_vendor: int = Field(default=0, ge=0, le=0xFFFF, description="USB vendor id; 0 is any")
-    usb_product: int = Field(default=0, ge=0, le=0xFFFF, description="USB product id; 0 is any")
-    usb_serial: str = Field(default="", description='USB serial number; "" is any')
     baud: int = Field(default=115200, ge=1200, le=4_000_000, description="bits per second")
 
     @model_validator(mode="after")
     def _fits_together(self) -> LinkSettings:
-        if self.board == "serial" and not (self.port or self.usb_vendor or self.usb_serial):
-            raise refusal("board", self.board, "link.port, link.usb_vendor or link.usb_serial too")
-        if self.usb_product and not self.usb_vendor:
-            raise refusal("usb_product", self.usb_product, "link.usb_vendor too")
+        if self.board == "serial" and not self.port:
+            raise refusal("port", self.port, 'a serial port, because link.board is "serial"')
+        if self.port:
+            try:
+                PortAddress.parse(self.port)
+            except ConfigError:
+                raise refusal(
+                    "port", self.port, 'a path such as "/dev/polepilot", or VID:PID in hexadecimal'
+                ) from None
         return self
 
 
 class DriveSettings(Section):
     """How duty becomes speed and servo angle becomes steering: this robot's calibration."""
 
-    full_speed_m_s: float = Field(
-        default=0.5, gt=0, le=20, description="speed at full duty, metres per second"
+    full_speed_left_m_s: float = Field(
+        default=_DRIVE.full_speed_left,
+        gt=0,
+        le=20,
+        description="speed of the left wheel at full duty, metres per second",
+    )
+    full_speed_right_m_s: float = Field(
+        default=_DRIVE.full_speed_right,
+        gt=0,
+        le=20,
+        description="the same for the right wheel; a difference is the trim",
     )
     dead_band: float = Field(
-        default=0.0, ge=0, lt=1, description="share of the full duty below which the wheels stand"
-    )
-    trim_left: float = Field(default=1.0, gt=0, le=2, description="factor on the left motor's duty")
-    trim_right: float = Field(
-        default=1.0, gt=0, le=2, description="factor on the right motor's duty"
+        default=_DRIVE.dead_band,
+        ge=0,
+        lt=1,
+        description="share of the full duty below which the wheels stand",
     )
     servo_center_rad: float = Field(
-        default=0.0, ge=-1.5, le=1.5, description="servo angle that drives straight, radians"
+        default=_DRIVE.servo_center,
+        ge=-1.5,
+        le=1.5,
+        description="servo angle that drives straight, radians",
     )
-    servo_range_rad: float = Field(
-        default=_VEHICLE.max_steering,
+    servo_scale: float = Field(
+        default=_DRIVE.servo_scale,
+        ge=-10,
+        le=10,
+        description="servo angle per steering angle; negative where the servo is mirrored",
+    )
+    servo_limit_rad: float = Field(
+        default=_DRIVE.servo_limit,
         gt=0,
         lt=math.pi / 2,
-        description="servo travel to either side",
+        description="largest servo angle to either side, radians",
     )
-    encoder_counts_per_m: float = Field(
-        default=0.0, ge=0, description="wheel encoder counts per metre; 0 without encoders"
+    counts_per_m: float = Field(
+        default=_DRIVE.counts_per_metre,
+        ge=0,
+        description="wheel encoder counts per metre; 0 without encoders",
     )
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> DriveSettings:
+        if abs(self.servo_center_rad) >= self.servo_limit_rad:
+            raise refusal(
+                "servo_center_rad",
+                self.servo_center_rad,
+                f"within servo_limit_rad ({self.servo_limit_rad})",
+            )
+        if self.servo_scale == 0:
+            raise refusal("servo_scale", self.servo_scale, "another number than 0")
+        return self
 
 
 class LocalizerSettings(Section):
@@ -354,14 +392,12 @@ class SimulationSettings(Section):
         description='"rendered" pictures go through the detector; "measured" draws range and '
         "bearing from its error model",
     )
-    speed_scale_error: float = Field(
-        default=0.03, ge=0, le=0.5, description="largest share by which the true speed differs"
-    )
-    steering_offset_rad: float = Field(
-        default=math.radians(1), ge=0, le=0.5, description="largest steering misalignment, radians"
-    )
-    slip: float = Field(
-        default=0.01, ge=0, le=1, description="random share of the way lost to slip"
+    imperfection: float = Field(
+        default=1.0,
+        ge=0,
+        le=5,
+        description="factor on speed and steering errors, slip and lag; 0 is a robot that does "
+        "exactly what it is told",
     )
 
 

@@ -58,6 +58,8 @@ class RangeBearing:
     bearing: float
     range_sigma: float
     bearing_sigma: float
+    pan: float | None = None
+    """Where the camera pointed, where known: the potentiometer's error depends on it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,85 @@
+"""Landmarks that contradict the rest: moved, or read with a wrong number."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from polepilot.core.geometry import Point
+from polepilot.core.landmark import Landmark
+
+_SIGHTINGS = 6
+"""Contradicting sightings before a landmark is judged."""
+_SPAN = 2.0
+"""Seconds between the first and the last of them: more than one pass of the camera."""
+_MEMORY = 60.0
+_SCATTER = 0.12
+"""How well they must agree on the new place, metres."""
+_SHIFT = 0.12
+_FAMILY = 0.35
+"""A place this near to another landmark is that landmark, misread."""
+
+
+class Verdict(NamedTuple):
+    """What is wrong with a landmark, and by how much it appears displaced, metres."""
+
+    landmark: int
+    code: Literal["landmark_moved", "landmark_misread"]
+    dx: float
+    dy: float
+
+
+@dataclass(slots=True)
+class LandmarkHealth:
+    """Collects where landmarks appear that do not stand where the map has them."""
+
+    landmarks: Mapping[int, Landmark]
+    _places: dict[int, deque[tuple[float, Point]]] = field(default_factory=dict)
+    _agreed: dict[int, int] = field(default_factory=dict)
+    moved: dict[int, Point] = field(default_factory=dict)
+    """Landmarks found displaced, and by how much; they are not to be used."""
+
+    def contradicted(self, number: int, stamp: float, place: Point) -> Verdict | None:
+        """``number`` appeared at ``place`` while other landmarks agreed with the pose."""
+        self._agreed.pop(number, None)
+        if number in self.moved:
+            return None
+        places = self._places.setdefault(number, deque(maxlen=24))
+        places.append((stamp, place))
+        while stamp - places[0][0] > _MEMORY:
+            places.popleft()
+        if len(places) < _SIGHTINGS or stamp - places[0][0] < _SPAN:
+            return None
+        points = np.array([point for _, point in places])
+        middle = np.median(points, axis=0)
+        scatter = float(np.median(np.hypot(*(points - middle).T)))
+        mark = self.landmarks[number]
+        dx, dy = float(middle[0]) - mark.x, float(middle[1]) - mark.y
+        if scatter > _SCATTER or math.hypot(dx, dy) < _SHIFT:
+            return None
+        self._places.pop(number)
+        others = (other for other in self.landmarks.values() if other.id != number)
+        if any(math.dist(middle, other.position) < _FAMILY for other in others):
+            return Verdict(number, "landmark_misread", dx, dy)
+        self.moved[number] = (dx, dy)
+        return Verdict(number, "landmark_moved", dx, dy)
+
+    def agreed(self, number: int) -> bool:
+        """``number`` was seen where the map has it; True if that brings it back into use."""
+        self._places.pop(number, None)
+        if number not in self.moved:
+            return False
+        self._agreed[number] = self._agreed.get(number, 0) + 1
+        if self._agreed[number] < _SIGHTINGS:
+            return False
+        del self.moved[number], self._agreed[number]
+        return True
+
+    def forget(self) -> None:
+        """The pose itself was wrong: what contradicted it says nothing of the landmarks."""
+        self._places.clear()

@@ -1,0 +1,229 @@
+"""Dead reckoning from speed, wheel angle and elapsed time: the paper's "time encoder".
+
+Eqs. 4-9 of the paper do not form a rigid motion as printed (method.md, "Time encoder"). Here
+`base_link` moves on the exact circular arc of the kinematic bicycle with wheelbase L::
+
+    kappa = tan(steering) / L,   turn = speed dt kappa
+
+In the robot's own frame it ends ``d sinc(turn)`` ahead and ``d (1 - cos turn) / turn`` to the
+left, d = speed dt. Written so, nothing jumps or cancels where the curvature goes to zero.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polepilot.core.errors import InternalError
+from polepilot.core.geometry import Pose2D, wrap_angle
+from polepilot.core.observation import Odometry
+
+_SMALL_TURN = 1e-3
+"""Below this turn (rad) the derivatives use their series, whose error is then under 1e-13."""
+
+
+def advance(pose: Pose2D, speed: float, steering: float, dt: float, wheelbase: float) -> Pose2D:
+    """Where `base_link` is after ``dt`` seconds at constant speed (m/s) and steering (rad)."""
+    distance = speed * dt
+    turn = distance * math.tan(steering) / wheelbase
+    ahead, left = distance * _sinc(turn), distance * _rise(turn)
+    cos, sin = math.cos(pose.heading), math.sin(pose.heading)
+    return Pose2D(
+        pose.x + cos * ahead - sin * left,
+        pose.y + sin * ahead + cos * left,
+        wrap_angle(pose.heading + turn),
+    )
+
+
+def advance_with_jacobians(
+    pose: Pose2D, speed: float, steering: float, dt: float, wheelbase: float
+) -> tuple[Pose2D, NDArray[np.float64]]:
+    """``advance`` and its 3 x 5 Jacobian by (x, y, heading, speed, steering)."""
+    tan = math.tan(steering)
+    curvature = tan / wheelbase
+    distance = speed * dt
+    turn = distance * curvature
+    ahead, left = distance * _sinc(turn), distance * _rise(turn)
+    cos, sin = math.cos(pose.heading), math.sin(pose.heading)
+    dx, dy = cos * ahead - sin * left, sin * ahead + cos * left
+    # By distance: the velocity turns with the heading. By curvature: derivatives of sinc, rise.
+    ahead_v, left_v = dt * math.cos(turn), dt * math.sin(turn)
+    curvature_by_steering = (1.0 + tan * tan) / wheelbase
+    ahead_g = distance * distance * _sinc_derivative(turn) * curvature_by_steering
+    left_g = distance * distance * _rise_derivative(turn) * curvature_by_steering
+    jacobian = np.array(
+        [
+            [1.0, 0.0, -dy, cos * ahead_v - sin * left_v, cos * ahead_g - sin * left_g],
+            [0.0, 1.0, dx, sin * ahead_v + cos * left_v, sin * ahead_g + cos * left_g],
+            [0.0, 0.0, 1.0, curvature * dt, distance * curvature_by_steering],
+        ]
+    )
+    return Pose2D(pose.x + dx, pose.y + dy, wrap_angle(pose.heading + turn)), jacobian
+
+
+class Step(NamedTuple):
+    """A short stretch of time with constant speed and steering."""
+
+    dt: float
+    speed: float
+    steering: float
+    unsettled: float
+    """How far the servo still was from the angle it was told, rad: a measure of doubt."""
+
+
+class _Entry(NamedTuple):
+    stamp: float
+    speed: float
+    steering: float
+    speed_then: float
+    """What the motors did at ``stamp``, while on the way to ``speed``."""
+    steering_then: float
+
+
+class OdometryHistory:
+    """The last seconds of Odometry, with the servo's and the motors' lag; bounded in memory.
+
+    Motors and servo follow what they are told with first-order lags. The history answers how the
+    robot moved between any two moments of its span, so that a measurement which comes late is
+    applied at the pose from which it was made. Before the first entry the robot stood.
+    """
+
+    def __init__(
+        self,
+        wheelbase: float,
+        *,
+        steering_lag: float = 0.0,
+        speed_lag: float = 0.0,
+        span: float = 15.0,
+        longest_step: float = 0.05,
+    ) -> None:
+        if wheelbase <= 0 or steering_lag < 0 or speed_lag < 0 or span <= 0 or longest_step <= 0:
+            raise InternalError("an odometry history needs a positive wheelbase, span and step.")
+        self.wheelbase = wheelbase
+        self._steering_lag = steering_lag
+        self._speed_lag = speed_lag
+        self._span = span
+        self._longest_step = longest_step
+        self._entries: list[_Entry] = []
+        self._stamps: list[float] = []
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    @property
+    def last_stamp(self) -> float | None:
+        return self._stamps[-1] if self._stamps else None
+
+    def add(self, odometry: Odometry) -> None:
+        """Append; one that is older than the newest, or not finite, is ignored."""
+        stamp, speed, steering = odometry.stamp, odometry.speed, odometry.steering
+        if not (math.isfinite(stamp) and math.isfinite(speed) and math.isfinite(steering)):
+            return
+        if not self._entries:
+            self._push(_Entry(stamp, speed, steering, speed, steering))
+            return
+        last = self._entries[-1]
+        if stamp < last.stamp:
+            return
+        speed_then, steering_then = self._values(last, stamp)
+        if stamp == last.stamp:
+            self._entries.pop()
+            self._stamps.pop()
+        self._push(_Entry(stamp, speed, steering, speed_then, steering_then))
+        if self._stamps[0] < stamp - 2.0 * self._span:
+            # The one entry that was valid when the span begins stays.
+            keep = max(0, bisect_right(self._stamps, stamp - self._span) - 1)
+            del self._entries[:keep]
+            del self._stamps[:keep]
+
+    def steps(self, start: float, end: float) -> Iterator[Step]:
+        """The motion from ``start`` to ``end`` in steps of at most ``longest_step`` seconds."""
+        index = bisect_right(self._stamps, start) - 1
+        now = start
+        while now < end:
+            following = self._stamps[index + 1] if index + 1 < len(self._stamps) else math.inf
+            until = min(end, following)
+            if index < 0:
+                yield Step(until - now, 0.0, 0.0, 0.0)
+            else:
+                yield from self._entry_steps(self._entries[index], now, until)
+            now = until
+            index += 1
+
+    def advance(
+        self, pose: Pose2D, start: float, end: float, scale: float = 1.0, offset: float = 0.0
+    ) -> Pose2D:
+        """``pose`` moved from ``start`` to ``end``, or back where ``end`` is earlier.
+
+        ``scale`` and ``offset`` are what is known of the speed's and the steering's errors.
+        """
+        if end < start:
+            moved = self.advance(Pose2D(0.0, 0.0, 0.0), end, start, scale, offset)
+            return pose.compose(moved.inverse())
+        for step in self.steps(start, end):
+            if step.speed:
+                steering = step.steering + offset
+                pose = advance(pose, scale * step.speed, steering, step.dt, self.wheelbase)
+        return pose
+
+    def moved(self, start: float, end: float) -> tuple[float, float]:
+        """Metres travelled and seconds spent moving between two moments."""
+        distance = seconds = 0.0
+        for step in self.steps(start, end):
+            if abs(step.speed) > 1e-4:
+                distance += abs(step.speed) * step.dt
+                seconds += step.dt
+        return distance, seconds
+
+    def _push(self, entry: _Entry) -> None:
+        self._entries.append(entry)
+        self._stamps.append(entry.stamp)
+
+    def _entry_steps(self, entry: _Entry, start: float, end: float) -> Iterator[Step]:
+        still = entry.speed == 0.0 and abs(entry.speed_then) < 1e-4
+        count = 1 if still else max(1, math.ceil((end - start) / self._longest_step - 1e-9))
+        dt = (end - start) / count
+        if dt <= 0:
+            return
+        for index in range(count):
+            speed, steering = self._values(entry, start + (index + 0.5) * dt)
+            if abs(speed) < 1e-4:
+                speed = 0.0
+            yield Step(dt, speed, steering, abs(entry.steering - steering))
+
+    def _values(self, entry: _Entry, stamp: float) -> tuple[float, float]:
+        """Speed and steering that motors and servo had reached at ``stamp``."""
+        age = stamp - entry.stamp
+        speed, steering = entry.speed, entry.steering
+        if self._speed_lag > 0 and speed != entry.speed_then:
+            speed += (entry.speed_then - speed) * math.exp(-age / self._speed_lag)
+        if self._steering_lag > 0 and steering != entry.steering_then:
+            steering += (entry.steering_then - steering) * math.exp(-age / self._steering_lag)
+        return speed, steering
+
+
+def _sinc(turn: float) -> float:
+    """sin(a) / a."""
+    return math.sin(turn) / turn if turn else 1.0
+
+
+def _rise(turn: float) -> float:
+    """(1 - cos a) / a, without the cancellation."""
+    return math.sin(0.5 * turn) * _sinc(0.5 * turn)
+
+
+def _sinc_derivative(turn: float) -> float:
+    if abs(turn) < _SMALL_TURN:
+        return -turn / 3.0 + turn**3 / 30.0
+    return (math.cos(turn) - math.sin(turn) / turn) / turn
+
+
+def _rise_derivative(turn: float) -> float:
+    if abs(turn) < _SMALL_TURN:
+        return 0.5 - turn * turn / 8.0
+    return (math.sin(turn) - _rise(turn)) / turn

@@ -1,0 +1,121 @@
+"""Looking for the first pose: sightings of the last seconds, carried along while the robot moves.
+
+A standing robot collects landmarks during a sweep; a moving one refers each sighting, through dead
+reckoning, to the newest moment, and trusts it the less the farther it has driven since.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from polepilot.core.geometry import Pose2D
+from polepilot.core.landmark import Landmark
+from polepilot.core.localization.fix import Fix, FixRefusal, FixSettings, fix
+from polepilot.core.localization.odometry import OdometryHistory
+from polepilot.core.observation import RangeBearing
+
+_PER_LANDMARK = 8
+"""Sightings of one landmark that take part in a fix, the newest."""
+_NOTHING = FixRefusal("No landmark of the map has been seen.", "none")
+_LONGEST_WAY = 1.5
+"""Metres driven after which a sighting says nothing of the present pose any more."""
+
+
+@dataclass(slots=True)
+class FixSearch:
+    """Finds a Fix among the sightings of the last ``window`` seconds; bounded in memory."""
+
+    landmarks: Mapping[int, Landmark]
+    history: OdometryHistory
+    camera_forward: float
+    settings: FixSettings
+    window: float = 8.0
+    confirmations: int = 2
+    scale: float = 1.0
+    """What is known of the speed's error, as a factor."""
+    offset: float = 0.0
+    """What is known of the steering's error, radians."""
+    _sightings: deque[RangeBearing] = field(default_factory=lambda: deque(maxlen=400))
+    refusal: FixRefusal = _NOTHING
+    """Why the last attempt gave nothing."""
+
+    def clear(self) -> None:
+        self._sightings.clear()
+        self.refusal = _NOTHING
+
+    def add(self, measurement: RangeBearing) -> None:
+        """Keep a sighting of a landmark of the map that carries a range."""
+        if math.isfinite(measurement.range) and math.isfinite(measurement.range_sigma):
+            self._sightings.append(measurement)
+
+    def attempt(self, stamp: float) -> Fix | None:
+        """A confirmed pose at ``stamp``, or None with the reason in ``refusal``."""
+        while self._sightings and self._sightings[0].stamp < stamp - self.window:
+            self._sightings.popleft()
+        chosen: list[RangeBearing] = []
+        counts: dict[int, int] = {}
+        for sighting in reversed(self._sightings):
+            count = counts.get(sighting.landmark, 0)
+            if sighting.stamp <= stamp and count < _PER_LANDMARK:
+                counts[sighting.landmark] = count + 1
+                chosen.append(sighting)
+        chosen.reverse()
+        if sum(count >= self.confirmations for count in counts.values()) < 2:
+            if len(counts) == 1:
+                number = next(iter(counts))
+                reason = f"Only landmark {number} has been seen: a fix needs two."
+                self.refusal = FixRefusal(reason, "one_landmark", (number,))
+            elif counts:
+                reason = "The landmarks seen so far wait for a second sighting."
+                self.refusal = FixRefusal(reason, "one_landmark", tuple(sorted(counts)))
+            return None
+        kept: list[RangeBearing] = []
+        mounts: list[Pose2D] = []
+        for sighting in chosen:
+            carried = self._carry(sighting, stamp)
+            if carried is not None:
+                kept.append(carried[0])
+                mounts.append(carried[1])
+        answer = fix(kept, self.landmarks, self.camera_forward, self.settings, mounts)
+        if isinstance(answer, FixRefusal):
+            self.refusal = answer
+            return None
+        needed = self.confirmations if len(answer.landmarks) > 2 else self.confirmations + 1
+        sightings = [sum(m.landmark == number for m in kept) for number in answer.landmarks]
+        if len(answer.outliers) >= len(answer.landmarks) or sorted(sightings)[-2] < needed:
+            self.refusal = FixRefusal(
+                "The landmarks seen so far contradict each other or wait for another sighting.",
+                "contradiction",
+                answer.outliers,
+            )
+            return None
+        return answer
+
+    def _carry(self, sighting: RangeBearing, stamp: float) -> tuple[RangeBearing, Pose2D] | None:
+        """The sighting with honest errors, and where the camera was, seen from now."""
+        camera = Pose2D(self.camera_forward, 0.0, 0.0)
+        way, _ = self.history.moved(sighting.stamp, stamp)
+        if way == 0.0:
+            return sighting, camera
+        if way > _LONGEST_WAY:
+            return None
+        then = self.history.advance(
+            Pose2D(0.0, 0.0, 0.0), stamp, sighting.stamp, self.scale, self.offset
+        )
+        turned = 0.03 * way + 0.01 * math.sqrt(way)
+        shifted = 0.04 * way + turned * way
+        return (
+            replace(
+                sighting,
+                range_sigma=float(np.hypot(sighting.range_sigma, shifted)),
+                bearing_sigma=float(
+                    np.hypot(sighting.bearing_sigma, turned + shifted / max(sighting.range, 0.5))
+                ),
+            ),
+            then.compose(camera),
+        )

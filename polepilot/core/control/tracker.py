@@ -193,7 +193,9 @@ class PathTracker:
         """Move the cursor to the nearest point of the window, and measure the deviation."""
         low = int(np.searchsorted(stretch.along, self._along - SEARCH_BACK)) - 1
         high = int(np.searchsorted(stretch.along, self._along + SEARCH_AHEAD)) + 1
-        low, high = max(low, 0), min(high, len(stretch.along) - 1)
+        # The cursor may stand beyond the end of the stretch; the last piece is always in view.
+        low = min(max(low, 0), len(stretch.along) - 2)
+        high = min(max(high, low + 1), len(stretch.along) - 1)
         starts = stretch.points[low:high]
         steps = stretch.points[low + 1 : high + 1] - starts
         lengths = stretch.along[low + 1 : high + 1] - stretch.along[low:high]

@@ -27,6 +27,9 @@ class Disturbances:
     steering_offset: float = math.radians(1.0)
     """Where the front wheel points when it is told to point straight ahead."""
     motor_lag: float = 0.08
+    friction: float = 1.0
+    """What slows a wheel down besides, once its duty is zero, m/s²: gears, and the bridge that
+    shorts the motor."""
     servo_lag: float = 0.04
     rear_grip: float = 0.2
     """Who wins where the rear wheels' speeds do not fit the steering angle: 0 the front wheel,
@@ -161,10 +164,11 @@ class Motion:
         share = _share(dt, off.motor_lag)
         self.left += share * (actuation.left * full * (1 - off.wheel_difference / 2) - self.left)
         self.right += share * (actuation.right * full * (1 + off.wheel_difference / 2) - self.right)
-        if actuation.left == 0 and abs(self.left) < 1e-4:
-            self.left = 0.0
-        if actuation.right == 0 and abs(self.right) < 1e-4:
-            self.right = 0.0
+        rub = off.friction * dt
+        if actuation.left == 0:
+            self.left -= min(max(self.left, -rub), rub)
+        if actuation.right == 0:
+            self.right -= min(max(self.right, -rub), rub)
         self.left_travel += self.left * dt
         self.right_travel += self.right * dt
 

@@ -85,7 +85,14 @@ def test_motors_lag() -> None:
     robot.advance(0.1, Actuation(1000, 1000))
     assert robot.left == pytest.approx(0.5 * (1 - math.exp(-1)), rel=1e-6)
     assert not robot.standing
-    robot.advance(1.0, Actuation())
+    robot.advance(2.0, Actuation())
+    assert robot.standing
+
+
+def test_wheels_stand_within_a_sixth_of_a_second() -> None:
+    robot = motion(replace(Disturbances.none(), motor_lag=0.08, friction=1.0))
+    robot.advance(1.0, Actuation(800, 800))
+    robot.advance(0.16, Actuation())
     assert robot.standing
     before = robot.pose
     robot.advance(1.0, Actuation())

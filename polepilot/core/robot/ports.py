@@ -5,9 +5,11 @@ Nothing above these protocols knows which of them it talks to.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
+from polepilot.core.landmark import LandmarkKind
 from polepilot.core.observation import Detection, Frame
 
 
@@ -44,6 +46,10 @@ class CameraPort(Protocol):
 
 class SensorPort(Protocol):
     """A source of landmark sightings: a camera with a detector behind it, or a sensor model."""
+
+    def expect(self, kinds: Mapping[int, LandmarkKind]) -> None:
+        """Which landmarks are on the map from now on, and what they look like."""
+        ...
 
     def read(self) -> Sighting | None:
         """The newest sighting that was not read yet, or None; never blocks.

@@ -39,6 +39,15 @@ START_TOLERANCE = 0.5
 """How far from the start of its plan a mission may begin, metres."""
 EVENTS_SHOWN = 20
 
+_LEVELS: dict[str, Level] = {
+    "degraded": "warning",
+    "lost": "fault",
+    "landmark_moved": "warning",
+    "landmark_misread": "warning",
+    "landmark_unknown": "warning",
+}
+"""How bad the localizer's events are; the others are for information."""
+
 Ranges = tuple[float | None, float | None, float | None]
 
 
@@ -126,8 +135,10 @@ class Robot:
                 code="mission_active",
             )
         self._site = site
+        landmarks = site.landmarks_by_id()
+        self._sensor.expect({number: mark.kind for number, mark in landmarks.items()})
         self._localizer = Localizer(
-            site.landmarks_by_id(),
+            landmarks,
             self.settings.model.vehicle,
             self.settings.model.camera.forward,
             self.settings.localizer,
@@ -289,7 +300,7 @@ class Robot:
             localizer.refix(localizer.reason)
         self._estimate = localizer.estimate(now)
         for event in localizer.events():
-            self._say(event.code, event.level, event.text)
+            self._say(event.code, _LEVELS.get(event.code, "info"), event.text)
 
     def _use(self, sighting: Sighting, angle: float, localizer: Localizer) -> None:
         measurements: list[RangeBearing] = [

@@ -1,0 +1,224 @@
+"""The localizer run over a recording, causally: nothing later than t goes into the pose at t."""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from polepilot.core.errors import DatasetError, ImageError
+from polepilot.core.geometry import Pose2D, wrap_angle
+from polepilot.core.localization.localizer import Localizer, LocalizerEvent, LocalizerSettings
+from polepilot.core.localization.odometry import OdometryHistory
+from polepilot.core.observation import (
+    Detection,
+    Odometry,
+    PanReading,
+    PoseEstimate,
+    RangeBearing,
+    Status,
+)
+from polepilot.core.robot.dataset import Dataset, FrameFile
+from polepilot.core.trajectory import format_tum
+
+See = Callable[[FrameFile], Sequence[Detection]]
+"""Reads the landmarks of a picture. Raises ImageError where it is none."""
+
+_CLOCK_JUMP = 2.0
+"""Seconds without any sample after which nobody knows how the robot has moved."""
+_COUNT = math.radians(270) / 1023
+"""One step of the potentiometer's converter, radians."""
+
+
+@dataclass(slots=True)
+class ReplayResult:
+    """What a replay found; a row per frame as soon as a pose is known."""
+
+    frames: int = 0
+    estimates: list[PoseEstimate] = field(default_factory=list)
+    measured: list[tuple[float, Pose2D]] = field(default_factory=list)
+    deadreckoned: list[tuple[float, Pose2D]] = field(default_factory=list)
+    events: list[LocalizerEvent] = field(default_factory=list)
+
+    def to_json(self) -> dict[str, Any]:
+        """The ``replay --json`` document."""
+        return {
+            "frames": self.frames,
+            "poses": len(self.estimates),
+            "first_pose_t": self.estimates[0].stamp if self.estimates else None,
+            "events": [
+                {
+                    "t": event.stamp,
+                    "code": event.code,
+                    "landmark": event.landmark,
+                    "dx": event.dx,
+                    "dy": event.dy,
+                    "text": event.text,
+                }
+                for event in self.events
+            ],
+        }
+
+
+class PanTrack:
+    """Where the camera pointed, from the potentiometer's last readings; never from later ones.
+
+    The pan turns steadily, so a straight line through the last few readings is finer than one
+    converter step, and carries on to the moment of exposure.
+    """
+
+    def __init__(self, minimum: float, maximum: float) -> None:
+        self._minimum, self._maximum = minimum, maximum
+        self._readings: deque[tuple[float, float]] = deque(maxlen=6)
+
+    def add(self, reading: PanReading) -> None:
+        self._readings.append((reading.stamp, reading.angle))
+
+    def at(self, stamp: float) -> tuple[float, float] | None:
+        """Angle and its standard deviation, radians; None where no reading is recent."""
+        if not self._readings or stamp - self._readings[-1][0] > 0.3:
+            return None
+        recent = [(t - stamp, a) for t, a in self._readings if stamp - t < 0.3]
+        last_t, last = recent[-1]
+        angle, rate = last, 0.0
+        for count in (6, 3, 2):
+            points = np.array(recent[-count:])
+            if len(points) < 2 or np.ptp(points[:, 0]) < 1e-6:
+                break
+            rate, angle = (float(v) for v in np.polyfit(points[:, 0], points[:, 1], 1))
+            residual = points[:, 1] - angle - rate * points[:, 0]
+            if float(np.abs(residual).max()) < 1.1 * _COUNT:
+                break
+        margin = 2.0 * abs(rate * last_t)
+        sigma = 0.3 * _COUNT
+        if last + margin > self._maximum or last - margin < self._minimum:
+            # It may have turned round since.
+            sigma += margin
+        return min(max(angle, self._minimum), self._maximum), sigma
+
+
+def replay(
+    dataset: Dataset,
+    see: See,
+    settings: LocalizerSettings | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> ReplayResult:
+    """Run the localizer over ``dataset``; ``see`` reads each picture, ``progress`` counts them.
+
+    A pose that is lost is looked for again at once, in motion too. A picture that cannot be read
+    is left out and reported as the event ``frame_skipped``.
+    """
+    settings = settings or LocalizerSettings()
+    half_range = max(abs(dataset.pan_minimum), abs(dataset.pan_maximum))
+    settings = replace(settings, noise=replace(settings.noise, pan_range=half_range))
+    localizer = Localizer(dataset.landmarks, dataset.vehicle, dataset.camera.forward, settings)
+    pan = PanTrack(dataset.pan_minimum, dataset.pan_maximum)
+    # Dead reckoning for comparison takes the commands as they are.
+    commands = OdometryHistory(dataset.vehicle.wheelbase)
+    reckoned: tuple[float, Pose2D] | None = None
+    result = ReplayResult()
+    last = dataset.samples[0].stamp if dataset.samples else 0.0
+    for sample in dataset.samples:
+        stamp = sample.stamp
+        if stamp - last > _CLOCK_JUMP:
+            text = f"Nothing was recorded for {stamp - last:.1f} s: the pose is looked for anew."
+            result.events.append(LocalizerEvent(stamp, "clock_jump", text))
+            localizer.refix(text)
+        last = stamp
+        if isinstance(sample, Odometry):
+            localizer.add_odometry(sample)
+            commands.add(sample)
+            continue
+        if isinstance(sample, PanReading):
+            pan.add(sample)
+            continue
+        result.frames += 1
+        localizer.add_measurements(_look(sample, see, pan, result))
+        if localizer.status is Status.LOST:
+            result.events += localizer.events()
+            localizer.refix(localizer.reason)
+        estimate = localizer.estimate(stamp)
+        result.events += localizer.events()
+        if estimate is not None:
+            result.estimates.append(estimate)
+            seen_at, seen = localizer.measured or (stamp, estimate.pose)
+            result.measured.append((stamp, localizer.history.advance(seen, seen_at, stamp)))
+        if reckoned is not None:
+            reckoned = (stamp, commands.advance(reckoned[1], reckoned[0], stamp))
+        elif estimate is not None:
+            reckoned = (stamp, estimate.pose)
+        if reckoned is not None:
+            result.deadreckoned.append(reckoned)
+        if progress is not None:
+            progress(result.frames)
+    return result
+
+
+def write_results(result: ReplayResult, out: Path) -> None:
+    """Write the trajectories into ``out`` (made if need be), all of them or none.
+
+    Raises:
+        DatasetError: the folder cannot be written.
+    """
+    poses = [estimate.pose for estimate in result.estimates]
+    covariance = []
+    for estimate in result.estimates:
+        p = estimate.covariance
+        values = (p[0, 0], p[0, 1], p[0, 2], p[1, 1], p[1, 2], p[2, 2])
+        covariance.append(f"{estimate.stamp:.6f} " + " ".join(f"{v:.9e}" for v in values) + "\n")
+    files = {
+        "estimated.tum": format_tum((e.stamp for e in result.estimates), poses),
+        "measured.tum": format_tum(*_columns(result.measured)),
+        "deadreckoned.tum": format_tum(*_columns(result.deadreckoned)),
+        "estimated.cov": "".join(covariance),
+    }
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=out, prefix=".replay-") as folder:
+            for name, text in files.items():
+                (Path(folder) / name).write_text(text, encoding="ascii")
+            for name in files:
+                os.replace(Path(folder) / name, out / name)
+    except OSError as error:
+        raise DatasetError(f"{out}: the results cannot be written ({error}).") from error
+
+
+def _look(frame: FrameFile, see: See, pan: PanTrack, result: ReplayResult) -> list[RangeBearing]:
+    """What one picture tells, with the pan angle of its moment."""
+    try:
+        detections = see(frame)
+    except ImageError as error:
+        text = f"samples.jsonl:{frame.line}: picture left out: {error.message}"
+        result.events.append(LocalizerEvent(frame.stamp, "frame_skipped", text))
+        return []
+    if not detections:
+        return []
+    pointing = pan.at(frame.stamp)
+    if pointing is None:
+        text = f"samples.jsonl:{frame.line}: picture left out: no pan reading within 0.3 s."
+        result.events.append(LocalizerEvent(frame.stamp, "frame_skipped", text))
+        return []
+    angle, sigma = pointing
+    return [
+        RangeBearing(
+            stamp=frame.stamp,
+            landmark=detection.id,
+            range=detection.range,
+            bearing=wrap_angle(angle + detection.bearing),
+            range_sigma=detection.range_sigma,
+            bearing_sigma=math.hypot(detection.bearing_sigma, sigma),
+            pan=angle,
+        )
+        for detection in detections
+    ]
+
+
+def _columns(rows: list[tuple[float, Pose2D]]) -> tuple[list[float], list[Pose2D]]:
+    return [stamp for stamp, _ in rows], [pose for _, pose in rows]

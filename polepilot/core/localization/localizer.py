@@ -140,6 +140,7 @@ class Localizer:
         self._measured: tuple[float, Pose2D] | None = None
         self._predicted: tuple[float, Pose2D] | None = None
         self._against: list[RangeBearing] = []
+        self._gap = 0.0
         self._last_agreed: dict[int, float] = {}
         self._reported: dict[tuple[str, int], float] = {}
         self._events: deque[LocalizerEvent] = deque(maxlen=256)
@@ -238,6 +239,11 @@ class Localizer:
         ahead.predict(self._history, now)
         covariance = ahead.filter.pose_covariance
         self._judge(ahead.stamp, ahead.moving, _largest_sigma(covariance))
+        if len(self._against) >= 2:
+            # Something contradicts the pose and nothing has confirmed it since.
+            covariance[0, 0] += self._gap**2
+            covariance[1, 1] += self._gap**2
+            covariance[2, 2] += (self._gap / 3.0) ** 2
         return PoseEstimate(ahead.stamp, ahead.filter.pose, covariance, self._status, self._reason)
 
     def _usable(self, measurement: RangeBearing) -> bool:
@@ -316,6 +322,7 @@ class Localizer:
         self._report(stamp, "rejected", text, number, offset)
         if gap > settings.tolerance:
             self._against.append(measurement)
+            self._gap = gap
             del self._against[:-200]
         if place is not None and self._others_agree(number, stamp):
             verdict = self._health.contradicted(number, stamp, place)
@@ -348,7 +355,15 @@ class Localizer:
         first = self._against[0].stamp
         ids = " and ".join(str(number) for number in sorted(counts))
         limit = f"{100 * self.settings.tolerance:.0f} cm"
-        if len(firm) >= 2 or (firm and stamp - first > 5.0):
+        # The paper's tracking drifts in heading until every landmark contradicts it, so there the
+        # first one is enough, as the paper has it.
+        # So is one that agreed before: it has not moved by itself.
+        paper = self.settings.method == "paper"
+        hasty = any(
+            count >= 3 and (paper or number in self._last_agreed)
+            for number, count in counts.items()
+        )
+        if len(firm) >= 2 or (firm and stamp - first > 5.0) or hasty:
             self._lose(
                 stamp,
                 f"Landmark {ids} appear{'s' if len(counts) == 1 else ''} more than {limit} from "

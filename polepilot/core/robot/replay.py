@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import tempfile
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -185,7 +184,7 @@ def write_results(result: ReplayResult, out: Path) -> None:
             for name, text in files.items():
                 (Path(folder) / name).write_text(text, encoding="ascii")
             for name in files:
-                os.replace(Path(folder) / name, out / name)
+                (Path(folder) / name).replace(out / name)
     except OSError as error:
         raise DatasetError(f"{out}: the results cannot be written ({error}).") from error
 

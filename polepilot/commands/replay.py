@@ -1,0 +1,88 @@
+"""`polepilot replay`: the localizer over a recorded run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def replay(
+    dataset: Annotated[
+        Path, typer.Argument(help="Folder with dataset.json, samples.jsonl and pictures.")
+    ],
+    out: Annotated[Path, typer.Option("--out", help="Folder for the trajectories.")],
+    method: Annotated[
+        str, typer.Option("--method", help="ekf, or the paper's method: paper.")
+    ] = "ekf",
+    smooth: Annotated[
+        bool, typer.Option("--smooth", help="Also write smoothed.tum, the offline best.")
+    ] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
+) -> None:
+    """Run the localizer over a recorded run and write where the robot was."""
+    import json as json_module
+    import math
+
+    import numpy as np
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from polepilot.core.errors import ImageError, InputError
+    from polepilot.core.localization.localizer import LocalizerSettings
+    from polepilot.core.observation import Detection
+    from polepilot.core.robot.dataset import FrameFile, read_dataset
+    from polepilot.core.robot.replay import replay as run
+    from polepilot.core.robot.replay import write_results
+    from polepilot.core.trajectory import Trajectory, heading_errors, position_errors
+    from polepilot.core.vision.detector import LandmarkDetector
+    from polepilot.core.vision.images import read_image
+
+    if smooth:
+        raise InputError("--smooth is not available in this version: leave it out.")
+    if method not in ("ekf", "paper"):
+        raise InputError(f"--method is {method!r}: expected 'ekf' or 'paper'.")
+    recording = read_dataset(dataset)
+    camera = recording.camera
+    detector = LandmarkDetector(
+        camera, {number: mark.kind for number, mark in recording.landmarks.items()}
+    )
+
+    def see(frame: FrameFile) -> list[Detection]:
+        image = read_image(frame.path)
+        if image.shape[:2] != (camera.height, camera.width):
+            raise ImageError(
+                f"{frame.path}: {image.shape[1]} x {image.shape[0]} pixels: expected "
+                f"{camera.width} x {camera.height}."
+            )
+        return detector.detect(image)
+
+    with Progress(console=Console(stderr=True), transient=True) as bars:
+        task = bars.add_task("replaying", total=recording.frames)
+        result = run(
+            recording,
+            see,
+            LocalizerSettings(method="paper" if method == "paper" else "ekf"),
+            lambda done: bars.update(task, completed=done),
+        )
+    write_results(result, out)
+    if json:
+        typer.echo(json_module.dumps(result.to_json()))
+        return
+    typer.echo(f"{len(result.estimates)} poses from {result.frames} pictures -> {out}")
+    for event in result.events:
+        typer.echo(f"  {event.stamp:9.2f} s  {event.code:17} {event.text}")
+    if recording.truth is not None and result.estimates:
+        seen = Trajectory(
+            np.array([e.stamp for e in result.estimates]),
+            np.array([e.pose for e in result.estimates]),
+        )
+        position = position_errors(recording.truth, seen)
+        heading = heading_errors(recording.truth, seen)
+        typer.echo(
+            f"position error  mean {100 * position.mean:.1f} cm, p95 {100 * position.p95:.1f} cm, "
+            f"max {100 * position.max:.1f} cm (not aligned)"
+        )
+        mean, p95, worst = (math.degrees(v) for v in (heading.mean, heading.p95, heading.max))
+        typer.echo(f"heading error   mean {mean:.2f}°, p95 {p95:.2f}°, max {worst:.2f}°")

@@ -64,7 +64,7 @@ class BoardSettings:
     """Centidegrees."""
     slew: int = 4000
     """Largest change of a duty, per mille per second."""
-    hard_limits_mm: tuple[int, int, int] = (106, 100, 106)
+    hard_limits_mm: tuple[int, int, int] = (107, 100, 107)
     """Left, centre, right: nearer than this to the sensor nothing turns forward."""
     pan_low: int = 8
     """ADC counts: at or below, the pan motor turns only back."""

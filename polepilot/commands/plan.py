@@ -1,0 +1,116 @@
+"""``polepilot plan``: what a job will do, before a wheel turns."""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from polepilot.core.plan import Plan
+    from polepilot.core.site import Start
+
+
+class JobMode(StrEnum):
+    """What to plan."""
+
+    SCAN = "scan"
+    ROUTE = "route"
+
+
+class LoopOrder(StrEnum):
+    """In which order loops are driven."""
+
+    DEFAULT = "default"
+    PAPER = "paper"
+
+
+def plan(
+    site_file: Annotated[Path, typer.Argument(metavar="SITE.json", help="Site, or GeoJSON.")],
+    mode: Annotated[JobMode, typer.Option(help="Scan the area, or track a route.")] = JobMode.SCAN,
+    route: Annotated[str | None, typer.Option(help="Name of the route to track.")] = None,
+    tool_width: Annotated[float, typer.Option(help="Width that one pass sweeps, m.")] = 0.4,
+    clearance: Annotated[float, typer.Option(help="Path to walls, at least, m.")] = 0.2,
+    min_turn_radius: Annotated[float, typer.Option(help="Tightest turn, m; 0 for none.")] = 0.6,
+    start: Annotated[str | None, typer.Option(help="X,Y or X,Y,HEADING; m and rad.")] = None,
+    order: Annotated[LoopOrder, typer.Option(help="Order of the loops.")] = LoopOrder.DEFAULT,
+    plot: Annotated[Path | None, typer.Option(help="Write a drawing here, SVG.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
+) -> None:
+    """Plan a job on a site: its path, what it covers, what cannot be reached, how long it takes."""
+    import json
+
+    from polepilot.core.errors import InputError
+    from polepilot.core.planning.coverage import plan_scan
+    from polepilot.core.planning.options import PlanOptions
+    from polepilot.core.planning.plot import plot_svg
+    from polepilot.core.planning.route import plan_route
+    from polepilot.core.site import read_site
+
+    site = read_site(site_file)
+    options = PlanOptions(
+        tool_width=tool_width,
+        clearance=clearance,
+        min_turn_radius=min_turn_radius,
+        start=parse_start(start) if start is not None else None,
+        order=order.value,
+    )
+    if mode is JobMode.ROUTE:
+        if route is None:
+            known = ", ".join(repr(entry.name) for entry in site.routes) or "none"
+            raise InputError(f"--route is missing: the site's routes are {known}.")
+        result = plan_route(site, route, options)
+    elif route is not None:
+        raise InputError("--route is given with --mode scan: expected --mode route.")
+    else:
+        result = plan_scan(site, options)
+    if plot is not None:
+        try:
+            plot.write_text(plot_svg(site, result), encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"--plot {plot}: cannot be written: {error.strerror}.") from error
+    if as_json:
+        typer.echo(json.dumps(result.to_json(), allow_nan=False))
+    else:
+        typer.echo(_summary(result))
+
+
+def parse_start(text: str) -> Start:
+    """A start typed as ``X,Y`` or ``X,Y,HEADING`` (metres, radians).
+
+    Raises:
+        InputError: anything else.
+    """
+    from polepilot.core.errors import InputError
+    from polepilot.core.geometry import wrap_angle
+    from polepilot.core.site import Start
+
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (2, 3) or not all(math.isfinite(number) for number in numbers):
+        raise InputError(f"--start is {text!r}: expected X,Y or X,Y,HEADING in metres and radians.")
+    heading = wrap_angle(numbers[2]) if len(numbers) == 3 else None
+    return Start(numbers[0], numbers[1], heading)
+
+
+def _summary(result: Plan) -> str:
+    """A few lines for a person."""
+    predicted = result.predicted
+    minutes, seconds = divmod(round(predicted.duration), 60)
+    lines = [
+        f"length     {predicted.length:.1f} m",
+        f"duration   {minutes} min {seconds} s",
+        f"reversals  {predicted.reversals}",
+    ]
+    if result.mode == "scan":
+        lines.insert(0, f"coverage   {predicted.coverage * 100:.1f} % of {result.area.area:.1f} m²")
+    for piece in result.unreachable:
+        x, y = (sum(values) / len(piece.polygon) for values in zip(*piece.polygon, strict=True))
+        lines.append(f"unreachable near ({x:.2f}, {y:.2f}): {piece.reason}")
+    lines += list(result.notes)
+    return "\n".join(lines)

@@ -1,0 +1,288 @@
+"""Scanning Area: nested loops over everything that the robot can reach, in a drivable order."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import MultiPolygon, Polygon
+
+from polepilot.core.errors import PlanError
+from polepilot.core.geometry import Pose2D
+from polepilot.core.plan import PartKind, Plan, PlanPart
+from polepilot.core.planning.drivable import Driver
+from polepilot.core.planning.offset import (
+    Points,
+    Stroke,
+    cleanup_strokes,
+    nested_loops,
+    sharp_space,
+)
+from polepilot.core.planning.options import PlanOptions
+from polepilot.core.planning.order import Run, ordered_runs
+from polepilot.core.planning.score import predict
+from polepilot.core.planning.space import FreeSpace, as_multi, free_poles, free_space
+from polepilot.core.planning.swept import swept_shape
+from polepilot.core.planning.unreachable import unreachable_pieces
+from polepilot.core.site import Site
+
+Gears = NDArray[np.int8]
+Progress = Callable[[float, str], None]
+"""Called with the share done, 0 to 1, and what is being done."""
+
+LONGEST = 200_000.0
+"""A plan longer than this would not be a day's work but a year's, metres."""
+_SMALLEST = 0.008
+"""Missed patches below this are left, m² for a tool of 0.4 m; scaled with its square."""
+
+
+def plan_scan(
+    site: Site,
+    options: PlanOptions,
+    area: MultiPolygon | None = None,
+    progress: Progress | None = None,
+) -> Plan:
+    """The path that sweeps the reachable area, or of it only ``area`` (patches missed before).
+
+    Begins at the start. ``Plan.area`` is what is to be swept and what the coverage refers to.
+
+    Raises:
+        PlanError: the robot does not fit, or there is nothing to sweep.
+    """
+    began = time.perf_counter()
+    report = progress or _silent
+    report(0.0, "free space")
+    space = free_space(site, options)
+    reachable = space.reachable()
+    reachable = as_multi(reachable.intersection(space.floor))
+    if reachable.area / options.tool_width > LONGEST:
+        raise PlanError(
+            f"the reachable area of {reachable.area:.0f} m² is too large for a tool of "
+            f"{options.tool_width:g} m: expected a path of at most {LONGEST / 1000:.0f} km."
+        )
+    target = reachable if area is None else as_multi(reachable.intersection(area.buffer(0)))
+    if target.area < 1e-4:
+        raise PlanError("nothing of the area to scan can be reached from the start.")
+    report(0.1, "loops")
+    strokes = _strokes(site, space, options, target, whole=area is None)
+    if not strokes:
+        raise PlanError("nothing of the area to scan can be reached from the start.")
+    report(0.3, "order")
+    runs = ordered_runs(
+        strokes, space.start.position, space, options.order, reach=options.tool_width
+    )
+    report(0.5, "path")
+    notes = [*site.repairs, *space.notes]
+    path, gear, parts = _path(runs, space, options, target, notes)
+    report(0.8, "unreachable parts")
+    pieces = unreachable_pieces(space, reachable)
+    report(0.9, "prediction")
+    predicted = predict(path, gear, target, options)
+    report(1.0, "done")
+    return Plan(
+        mode="scan",
+        path=path,
+        gear=gear,
+        parts=parts,
+        unreachable=pieces,
+        predicted=predicted,
+        tool_width=options.tool_width,
+        clearance=options.clearance,
+        min_turn_radius=options.min_turn_radius,
+        area=target,
+        notes=tuple(notes),
+        runtime=time.perf_counter() - began,
+    )
+
+
+def _silent(share: float, what: str) -> None:
+    """Nobody wants to know."""
+    del share, what
+
+
+def _strokes(
+    site: Site, space: FreeSpace, options: PlanOptions, target: MultiPolygon, whole: bool
+) -> list[Stroke]:
+    """Loops and clean-up passes for ``target``; for patches only passes and what loops cross it."""
+    tool = options.tool_width
+    smallest = _SMALLEST * (tool / 0.4) ** 2
+    if options.min_turn_radius > 0:
+        pieces = sharp_space(site, space, free_poles(site))
+        tolerance = min(0.02, 0.05 * tool)
+        smallest *= 2.5
+    else:
+        pieces = [space.polygon]
+        tolerance = min(0.002, 0.01 * tool)
+    if whole:
+        strokes = nested_loops(pieces, tool, tolerance)
+    else:
+        strokes = _patch_strokes(pieces, target, tool, tolerance)
+    for _ in range(2):
+        missed = target
+        if strokes:
+            lines = [np.vstack([s.points, s.points[:1]]) if s.closed else s.points for s in strokes]
+            shapes = [swept_shape(line, tool) for line in lines]
+            missed = target.difference(shapely.union_all(shapes))
+        more = cleanup_strokes(missed, tool, space, smallest)
+        strokes += more
+        if not more:
+            break
+    if not strokes:
+        strokes = cleanup_strokes(target, tool, space, 0.0)
+    return strokes
+
+
+def _patch_strokes(
+    pieces: list[Polygon], target: MultiPolygon, tool: float, tolerance: float
+) -> list[Stroke]:
+    """Loops inside of the larger patches; the narrow ones are left to clean-up passes."""
+    strokes: list[Stroke] = []
+    room = shapely.union_all(pieces)
+    for patch in target.geoms:
+        if patch.buffer(-0.55 * tool).is_empty:
+            continue
+        inner = patch.buffer(-0.4 * tool, join_style="mitre", mitre_limit=1.5)
+        spots = [
+            part
+            for part in shapely.get_parts(inner.intersection(room)).tolist()
+            if isinstance(part, Polygon) and part.area > 1e-3
+        ]
+        strokes += nested_loops(spots, tool, tolerance)
+    return strokes
+
+
+class _Recorder:
+    """Collects the parts of a path while it grows."""
+
+    def __init__(self) -> None:
+        self.parts: list[PlanPart] = []
+
+    def close(self, kind: PartKind, last: int) -> None:
+        first = self.parts[-1].last if self.parts else 0
+        if last > first:
+            if self.parts and self.parts[-1].kind == kind and kind != "loop":
+                self.parts[-1] = PlanPart(kind, self.parts[-1].first, last)
+            else:
+                self.parts.append(PlanPart(kind, first, last))
+
+
+def _path(
+    runs: list[Run],
+    space: FreeSpace,
+    options: PlanOptions,
+    target: MultiPolygon,
+    notes: list[str],
+) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
+    if options.min_turn_radius <= 0:
+        return _plain_path(runs, space, options)
+    return _driven_path(runs, space, options, target, notes)
+
+
+def _plain_path(
+    runs: list[Run], space: FreeSpace, options: PlanOptions
+) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
+    """Corners as sharp as they come, all forward."""
+    blocks: list[Points] = [np.array([space.start.position])]
+    recorder = _Recorder()
+    count = 1
+    for run in runs:
+        here = (float(blocks[-1][-1, 0]), float(blocks[-1][-1, 1]))
+        there = (float(run.points[0, 0]), float(run.points[0, 1]))
+        if math.dist(here, there) > 1e-6:
+            way = space.shortest_path(here, there)
+            if way is None:
+                continue
+            blocks.append(np.array(way[1:]))
+            count += len(way) - 1
+            recorder.close(_connection(way, options), count - 1)
+        blocks.append(run.points[1:])
+        count += len(run.points) - 1
+        recorder.close("loop" if run.stroke.closed else "cleanup", count - 1)
+    path = np.vstack(blocks)
+    return path, np.ones(len(path) - 1, np.int8), tuple(recorder.parts)
+
+
+def _connection(way: list[tuple[float, float]], options: PlanOptions) -> PartKind:
+    """A bridge joins neighbouring loops; anything longer is a link."""
+    length = sum(math.dist(a, b) for a, b in pairwise(way))
+    return "bridge" if len(way) == 2 and length <= 1.6 * options.tool_width else "link"
+
+
+def _driven_path(
+    runs: list[Run],
+    space: FreeSpace,
+    options: PlanOptions,
+    target: MultiPolygon,
+    notes: list[str],
+) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
+    """Followable by a steered wheel; what its curves miss is visited at the end."""
+    start = space.start
+    heading = start.heading
+    if heading is None:
+        first = runs[0].points
+        aim = first[0] if math.dist(first[0], start.position) > 0.05 else first[1]
+        heading = math.atan2(aim[1] - start.y, aim[0] - start.x)
+    driver = Driver(space, options.min_turn_radius, Pose2D(start.x, start.y, heading))
+    recorder = _Recorder()
+    left_out = _drive(driver, runs, recorder, options)
+    for _ in range(2):
+        path, _ = driver.track.arrays()
+        missed = target.difference(swept_shape(path, options.tool_width))
+        smallest = 3 * _SMALLEST * (options.tool_width / 0.4) ** 2
+        more = cleanup_strokes(missed, options.tool_width, space, smallest)
+        if not more:
+            break
+        pose = driver.track.pose
+        _drive(driver, _nearest_first(more, pose.position), recorder, options)
+    if left_out > 0.5:
+        notes.append(
+            f"{left_out:.1f} m of the loops cannot be driven with a turning radius of "
+            f"{options.min_turn_radius:g} m and were left out."
+        )
+    path, gear = driver.track.arrays()
+    if len(path) < 2:
+        raise PlanError(
+            f"the robot cannot move from the start with a turning radius of "
+            f"{options.min_turn_radius:g} m."
+        )
+    return path, gear, tuple(recorder.parts)
+
+
+def _drive(driver: Driver, runs: list[Run], recorder: _Recorder, options: PlanOptions) -> float:
+    """Drives the runs; returns the length that could not be driven, metres."""
+    left_out = 0.0
+    for run in runs:
+        points = run.points
+        here = driver.track.pose.position
+        step = points[1] - points[0]
+        place = (float(points[0, 0]), float(points[0, 1]))
+        if not driver.connect(place, math.atan2(step[1], step[0])):
+            recorder.close("link", driver.track.last)
+            left_out += float(np.hypot(*np.diff(points, axis=0).T).sum())
+            continue
+        near = math.dist(here, place) <= 1.6 * options.tool_width
+        recorder.close("bridge" if near else "link", driver.track.last)
+        left_out += driver.follow(points)
+        recorder.close("loop" if run.stroke.closed else "cleanup", driver.track.last)
+    return left_out
+
+
+def _nearest_first(strokes: list[Stroke], here: tuple[float, float]) -> list[Run]:
+    """Open passes, always the nearest end next."""
+    rest = list(strokes)
+    runs: list[Run] = []
+    while rest:
+        best, flip = min(
+            ((stroke, flip) for stroke in rest for flip in (False, True)),
+            key=lambda entry: math.dist(here, entry[0].points[-1 if entry[1] else 0]),
+        )
+        rest.remove(best)
+        points = best.points[::-1].copy() if flip else best.points
+        here = (float(points[-1, 0]), float(points[-1, 1]))
+        runs.append(Run(points, best, whole=False))
+    return runs

@@ -1,0 +1,471 @@
+"""Runs made followable by a steered front wheel that turns no tighter than a given radius.
+
+A run's straight pieces are kept. Each corner becomes the cheapest of the curves that fit into the
+free space: rounded where the cut stays under 5 cm, else driven up to and then turned with changes
+of gear (a curve of Reeds and Shepp between the two legs, before, at, or beyond the corner). Runs
+are connected the same way; where nothing fits, the robot backs out along its own track first,
+which is always possible. What cannot be connected at all is left out, and said.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import LineString
+
+from polepilot.core import geometry
+from polepilot.core.geometry import Pose2D, angle_between, wrap_angle
+from polepilot.core.planning.curves import (
+    Curve,
+    curve_length,
+    gear_changes,
+    sample,
+    shortest_curves,
+)
+from polepilot.core.planning.space import FreeSpace
+
+Points = NDArray[np.float64]
+
+CUT = 0.05
+"""A corner may be cut by this much, metres."""
+CHANGE = 0.5
+"""What a change of gear costs, as metres of path."""
+_RADIUS_MARGIN = 1.02
+"""Arcs are this much wider than asked for, so that their chords keep the radius."""
+_PLAIN = math.radians(3.0)
+"""A turn below this is left as it is where its legs are long enough."""
+_BACK_OUT = (0.25, 0.5, 0.8, 1.2, 1.8, 2.6, 3.8, 5.5, 8.0)
+"""How far to back out along the track where nothing fits, metres."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Turn:
+    """A way round a corner, in a frame with the corner at the origin and the way in along x."""
+
+    cost: float
+    cut: float
+    lead: float
+    """Where on the line of the way in it begins to turn, metres; negative: before the corner."""
+    visit: bool
+    """Whether the corner is driven to first; else the turn begins before it is reached."""
+    stop: float
+    """Where on the way out it ends; negative: before the corner."""
+    curve: Curve
+    """From ``lead`` to ``stop``."""
+
+    def after(self, before: float) -> Curve:
+        """The whole curve for a corner that lies ``before`` metres ahead."""
+        if self.visit:
+            return _joined((("S", before), ("S", self.lead), *self.curve))
+        return _joined((("S", before + self.lead), *self.curve))
+
+
+@dataclass(slots=True)
+class Track:
+    """The path so far: points, gears, and the pose at its end."""
+
+    pose: Pose2D
+    points: list[Points] = field(default_factory=list)
+    gears: list[NDArray[np.int8]] = field(default_factory=list)
+    count: int = 1
+    straight: float = 0.0
+    """How far the robot can go straight back from here on its own track."""
+
+    def __post_init__(self) -> None:
+        self.points.append(np.array([self.pose.position]))
+
+    @property
+    def last(self) -> int:
+        """Index of the last point."""
+        return self.count - 1
+
+    def add(self, points: Points, gears: NDArray[np.int8], pose: Pose2D) -> None:
+        """Appends points after the first, which is where the track ends."""
+        if len(gears):
+            self.points.append(points[1:])
+            self.gears.append(gears)
+            self.count += len(gears)
+        self.pose = pose
+
+    def arrays(self) -> tuple[Points, NDArray[np.int8]]:
+        gears = np.concatenate(self.gears) if self.gears else np.zeros(0, np.int8)
+        return np.vstack(self.points), gears
+
+
+class Driver:
+    """Drives runs one after the other, inside the free space, no tighter than ``radius``."""
+
+    def __init__(self, space: FreeSpace, radius: float, pose: Pose2D) -> None:
+        self._space = space
+        self._radius = radius * _RADIUS_MARGIN
+        self.track = Track(pose)
+
+    def follow(self, points: Points, cut: float = CUT) -> float:
+        """Drives along ``points``, on whose first leg the track already stands.
+
+        Returns the length that had to be left out, metres.
+        """
+        points = _tidy(points)
+        left_out = 0.0
+        index = 1
+        while index < len(points):
+            corner = points[index]
+            if index == len(points) - 1:
+                self._straight_to(corner)
+                return left_out
+            after = points[index + 1] - corner
+            heading = math.atan2(after[1], after[0])
+            if self._round(points, index, heading, cut):
+                index += 1
+                continue
+            # Nothing fits at this corner: go there, then find a way to what follows.
+            self._straight_to(corner)
+            resumed = self._resume(points, index)
+            if resumed is None:
+                return left_out + _length(points[index:])
+            skipped, index = resumed
+            left_out += skipped
+        return left_out
+
+    def begin(self, points: Points, cut: float) -> bool:
+        """Drives along ``points`` from where the track stands, its first leg included.
+
+        The whole line must be driven: False, and the track as before, where that fails.
+        """
+        points = _tidy(points)
+        saved = self._save()
+        step = points[1] - points[0]
+        heading, length = self._leg(step, float(np.hypot(*step)))
+        turned = self._turn_here(heading, length, math.inf) or self.connect(
+            (float(points[0, 0]), float(points[0, 1])), heading, back_out=False
+        )
+        if turned and self.follow(points, cut) == 0.0:
+            return True
+        self._restore(saved)
+        return False
+
+    def connect(self, place: geometry.Point, heading: float | None, back_out: bool = True) -> bool:
+        """Goes to ``place`` and stands there with ``heading`` (None: any); False: no way found.
+
+        Straight over where possible, else along the shortest path, else after backing out.
+        """
+        if math.dist(self.track.pose.position, place) < 1e-6 and (
+            heading is None or abs(angle_between(self.track.pose.heading, heading)) < 1e-6
+        ):
+            return True
+        if self._connect_here(place, heading):
+            return True
+        if not back_out:
+            return False
+        saved = self._save()
+        gone = 0.0
+        for distance in _BACK_OUT:
+            if not self._back_out(distance - gone):
+                break
+            gone = distance
+            if self._connect_here(place, heading):
+                return True
+        self._restore(saved)
+        return False
+
+    def _connect_here(self, place: geometry.Point, heading: float | None) -> bool:
+        """The cheaper of one curve and the shortest path with its corners turned."""
+        pose = self.track.pose
+        direct = None
+        if heading is not None and math.dist(pose.position, place) < 8 * self._radius:
+            direct = self._direct(place, heading)
+        far = math.dist(pose.position, place) > 4 * self._radius or heading is None
+        if direct is not None and not far:
+            self._append(direct[1])
+            return True
+        saved = self._save()
+        if self._along_path(place, heading):
+            if direct is None or self._cost_since(saved) <= direct[0]:
+                return True
+            self._restore(saved)
+        if direct is not None:
+            self._append(direct[1])
+            return True
+        self._restore(saved)
+        return False
+
+    def _direct(self, place: geometry.Point, heading: float) -> tuple[float, Curve] | None:
+        """The cheapest curve to a pose, perhaps from some way back or by way of a point ahead."""
+        pose = self.track.pose
+        goal = Pose2D(*place, heading)
+        found: list[tuple[float, Curve]] = []
+        backs = [0.0, *(b for b in (0.5 * self._radius, self._radius) if b <= self.track.straight)]
+        for back in backs:
+            here = Pose2D(*pose.ahead(-back), pose.heading)
+            for ahead in (0.0, -0.6 * self._radius, self._radius):
+                there = Pose2D(*goal.ahead(ahead), heading)
+                for curve in shortest_curves(here, there, self._radius, CHANGE)[:6]:
+                    whole = _joined((("S", -back), *curve, ("S", -ahead)))
+                    found.append((_cost(whole), whole))
+        found.sort(key=lambda entry: entry[0])
+        for cost, curve in found:
+            if self._fits(pose, curve):
+                return cost, curve
+        return None
+
+    def _along_path(self, place: geometry.Point, heading: float | None) -> bool:
+        """Along the shortest path, all of its corners turned; leaves the track half-way if not."""
+        path = self._space.shortest_path(self.track.pose.position, place)
+        if path is None:
+            return False
+        points = _tidy(np.array(path))
+        if len(points) < 2:
+            return False
+        first = points[1] - points[0]
+        legs = [self._leg(first, float(np.hypot(*first)))]
+        for index in range(1, len(points) - 1):
+            step = points[index + 1] - points[index]
+            legs.append(self._leg(step, float(np.hypot(*step))))
+        if not self._turn_here(legs[0][0], legs[0][1], math.inf):
+            return False
+        for index, (_, length) in enumerate(legs):
+            corner = points[index + 1]
+            if index + 1 < len(legs):
+                turn, room = legs[index + 1]
+            elif heading is not None:
+                turn, room = heading, 0.0
+            else:
+                self._straight_to(corner)
+                return True
+            before = float(np.hypot(*(corner - np.array(self.track.pose.position))))
+            if not self._turn_at(corner, turn, before, room, math.inf):
+                return False
+            if length < 1e-9:
+                return False
+        if heading is not None:
+            self._straight_to(points[-1])
+        return True
+
+    @staticmethod
+    def _leg(step: Points, length: float) -> tuple[float, float]:
+        return math.atan2(step[1], step[0]), length
+
+    def _round(self, points: Points, index: int, heading: float, cut: float) -> bool:
+        """Passes the corner ``points[index]``: plain, rounded, or turned."""
+        corner = points[index]
+        here = np.array(self.track.pose.position)
+        before = float(np.dot(corner - here, self._ahead()))
+        after = float(np.hypot(*(points[index + 1] - corner)))
+        turn = angle_between(self.track.pose.heading, heading)
+        if abs(turn) < _PLAIN and abs(turn) * self._radius < 0.7 * min(max(before, 0.0), after):
+            self._straight_to(corner)
+            self.track.pose = Pose2D(*self.track.pose.position, heading)
+            return True
+        room = after
+        if index + 2 < len(points):
+            # The corner after this one needs its share of the leg between them.
+            following = points[index + 2] - points[index + 1]
+            other = abs(angle_between(heading, math.atan2(following[1], following[0])))
+            mine = math.tan(min(abs(turn), 3.0) / 2)
+            theirs = math.tan(min(other, 3.0) / 2)
+            if self._radius * (1 / math.cos(min(other, 3.0) / 2) - 1) <= cut:
+                room = after * mine / max(mine + theirs, 1e-9)
+        tangent = self._radius * math.tan(min(abs(turn), 3.1) / 2)
+        width = self._radius * (1 / math.cos(min(abs(turn), 3.1) / 2) - 1)
+        if width <= cut and tangent <= min(before, room) + 1e-9:
+            arc: Curve = (("L" if turn > 0 else "R", abs(turn) * self._radius),)
+            whole = _joined((("S", before - tangent), *arc))
+            if self._fits(self.track.pose, whole):
+                self._append(whole)
+                self.track.straight = 0.0
+                return True
+        return self._turn_at(corner, heading, before, after, cut)
+
+    def _turn_here(self, heading: float, room: float, cut: float) -> bool:
+        """Turns to ``heading`` about the place where the track ends."""
+        return self._turn_at(np.array(self.track.pose.position), heading, 0.0, room, cut)
+
+    def _turn_at(
+        self, corner: Points, heading: float, before: float, after: float, cut: float
+    ) -> bool:
+        """Turns at a corner ``before`` metres straight ahead; cuts it by more only if it must."""
+        pose = self.track.pose
+        turn = angle_between(pose.heading, heading)
+        if abs(turn) < 1e-6:
+            self._straight_to(corner)
+            return True
+        room_before = before + self.track.straight
+        options = [
+            way
+            for way in _turns(round(turn, 9), round(self._radius, 9))
+            if -way.lead <= room_before + 1e-9 and way.stop <= after + 1e-9
+        ]
+        if math.isinf(cut):
+            options.sort(key=lambda way: way.cost - 20 * min(way.cut, 0.5) ** 2)
+        else:
+            options.sort(key=lambda way: (way.cut > cut, way.cost))
+        for way in options:
+            whole = way.after(before)
+            if self._fits(pose, whole):
+                self._append(whole)
+                self.track.pose = Pose2D(*self.track.pose.position, heading)
+                return True
+        return False
+
+    def _resume(self, points: Points, index: int) -> tuple[float, int] | None:
+        """Gets back onto ``points`` from the corner ``index`` or later; what was skipped, where."""
+        skipped = 0.0
+        for leg in range(index, min(len(points) - 1, index + 12)):
+            step = points[leg + 1] - points[leg]
+            length = float(np.hypot(*step))
+            heading = math.atan2(step[1], step[0])
+            for share in (0.0, 0.5):
+                place = points[leg] + share * step
+                there = (float(place[0]), float(place[1]))
+                if self.connect(there, heading, back_out=leg == index or share == 0.0):
+                    return skipped + share * length, leg + 1
+            skipped += length
+        return None
+
+    def _back_out(self, distance: float) -> bool:
+        """Drives back on its own track; False where the track is too short."""
+        points, gears = self.track.arrays()
+        taken: list[Points] = [points[-1]]
+        back: list[int] = []
+        rest = distance
+        index = len(gears) - 1
+        heading = self.track.pose.heading
+        while rest > 1e-6 and index >= 0:
+            a, b = points[index + 1], points[index]
+            step = float(np.hypot(*(b - a)))
+            if step > 1e-9:
+                gear = -int(gears[index])
+                forward = (b - a) * gear
+                heading = math.atan2(forward[1], forward[0])
+                taken.append(a + (b - a) * min(1.0, rest / step))
+                back.append(gear)
+            rest -= step
+            index -= 1
+        if rest > 1e-6:
+            return False
+        self.track.add(
+            np.array(taken),
+            np.array(back, np.int8),
+            Pose2D(float(taken[-1][0]), float(taken[-1][1]), heading),
+        )
+        self.track.straight = 0.0
+        return True
+
+    def _straight_to(self, corner: Points) -> None:
+        """Straight to a place on the line of the present heading, forward or back."""
+        way = float(np.dot(corner - np.array(self.track.pose.position), self._ahead()))
+        self._append((("S", way),))
+
+    def _append(self, curve: Curve) -> None:
+        curve = _joined(curve)
+        if not curve:
+            return
+        points, gears, pose = sample(self.track.pose, curve, self._radius)
+        straight = self.track.straight if curve[0][0] == "S" else 0.0
+        if len(curve) == 1 and curve[0][0] == "S":
+            straight = max(0.0, straight + curve[0][1])
+        else:
+            straight = max(0.0, curve[-1][1]) if curve[-1][0] == "S" else 0.0
+        self.track.add(points, gears, pose)
+        self.track.straight = straight
+
+    def _fits(self, pose: Pose2D, curve: Curve) -> bool:
+        return self._space.holds_points(sample(pose, curve, self._radius)[0])
+
+    def _ahead(self) -> Points:
+        heading = self.track.pose.heading
+        return np.array([math.cos(heading), math.sin(heading)])
+
+    def _save(self) -> tuple[int, int, Pose2D, float]:
+        return len(self.track.points), self.track.count, self.track.pose, self.track.straight
+
+    def _restore(self, saved: tuple[int, int, Pose2D, float]) -> None:
+        pieces, self.track.count, self.track.pose, self.track.straight = saved
+        del self.track.points[pieces:]
+        del self.track.gears[max(pieces - 1, 0) :]
+
+    def _cost_since(self, saved: tuple[int, int, Pose2D, float]) -> float:
+        points = np.vstack([self.track.points[saved[0] - 1][-1:], *self.track.points[saved[0] :]])
+        gears = [gear for block in self.track.gears[saved[0] - 1 :] for gear in block.tolist()]
+        changes = sum(a != b for a, b in pairwise(gears))
+        return float(_length(points) + CHANGE * changes)
+
+
+@lru_cache(maxsize=4000)
+def _turns(turn: float, radius: float) -> tuple[_Turn, ...]:
+    """Ways round a corner of ``turn`` radians, the cheapest first."""
+    legs = radius * math.tan(min(abs(turn), math.radians(120)) / 2)
+    out = np.array([math.cos(turn), math.sin(turn)])
+    ways: list[_Turn] = []
+
+    def add(first: float, last: float, visit: bool, finish: bool) -> None:
+        """From ``first`` on the way in to ``last`` on the way out, in shares of ``legs``.
+
+        ``visit``: to the corner before that; ``finish``: back to the corner after that.
+        """
+        first, last = first * legs, last * legs
+        start = Pose2D(first, 0.0, 0.0)
+        end = Pose2D(last * math.cos(turn), last * math.sin(turn), wrap_angle(turn))
+        for curve in shortest_curves(start, end, radius, CHANGE)[:8]:
+            checks: list[Points] = []
+            if not visit and first < 0:
+                checks += [np.array([first * share, 0.0]) for share in (0.0, 0.25, 0.5, 0.75)]
+            if not finish and last > 0:
+                checks += [last * share * out for share in (0.25, 0.5, 0.75)]
+            cut = 0.0
+            if checks:
+                line = LineString(sample(start, curve, radius)[0])
+                cut = float(np.max(shapely.distance(line, shapely.points(np.array(checks)))))
+            whole: Curve = (*curve, ("S", -last)) if finish else curve
+            stop = 0.0 if finish else last
+            way = _Turn(0.0, cut, first, visit, stop, _joined(whole))
+            cost = _cost(way.after(10.0)) - 10.0 - stop + 20 * min(cut, 0.5) ** 2
+            ways.append(replace(way, cost=cost))
+
+    for share in (0.25, 0.5, 0.75, 1.0):
+        add(-share, share, visit=False, finish=False)
+    for first, last in ((0, 0), (1, -1), (0.5, -0.5), (0.5, 0), (0, -0.5), (0, -1), (1, 0)):
+        add(first, last, visit=True, finish=False)
+    for first, last in ((-1, 1), (-0.5, 1), (-1, 0.5), (-0.5, 0.5), (-0.25, 0.25), (0, 0.5)):
+        add(first, last, visit=True, finish=True)
+        add(first, last, visit=True, finish=False)
+    for first, last in ((-0.5, 0), (-1, 0), (-0.5, -0.5), (-1.5, 1.5), (-2, 1), (-2, 2)):
+        add(first, last, visit=True, finish=True)
+    return tuple(sorted(ways, key=lambda way: way.cost))
+
+
+def _joined(curve: Curve) -> Curve:
+    """Neighbouring straight pieces in one gear as one; those that cancel are dropped.
+
+    Straight forward and back again is kept: it sweeps what lies there.
+    """
+    pieces: list[tuple[str, float]] = []
+    for kind, length in curve:
+        if abs(length) < 1e-9:
+            continue
+        if pieces and pieces[-1][0] == kind and (pieces[-1][1] > 0) == (length > 0):
+            pieces[-1] = (kind, pieces[-1][1] + length)
+        else:
+            pieces.append((kind, length))
+    return tuple(pieces)
+
+
+def _cost(curve: Curve) -> float:
+    """Of a curve that is entered and left in forward gear."""
+    return curve_length(curve) + CHANGE * gear_changes((("S", 1e-3), *curve, ("S", 1e-3)))
+
+
+def _tidy(points: Points) -> Points:
+    """Without repeated points."""
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    return points[np.r_[True, steps > 1e-6]]
+
+
+def _length(points: Points) -> float:
+    return float(np.hypot(*np.diff(points, axis=0).T).sum()) if len(points) > 1 else 0.0

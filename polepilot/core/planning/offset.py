@@ -1,0 +1,179 @@
+"""Nested offset loops of the free space, and the strokes that sweep what loops leave."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import LineString, Polygon
+
+from polepilot.core.planning.space import FreeSpace, polygons, quadrant
+from polepilot.core.site import Site
+
+Points = NDArray[np.float64]
+
+OVERLAP = 0.06
+"""Neighbouring passes overlap by at least this share of the tool width."""
+_THIN = 0.1
+"""A piece thinner than this share of the tool width is driven once, not around."""
+
+
+@dataclass(slots=True, eq=False)
+class Stroke:
+    """A line to be driven for what it sweeps: a closed loop, or an open clean-up pass.
+
+    ``points``: N x 2; of a loop, counter-clockwise, the first not repeated.
+    """
+
+    points: Points
+    closed: bool
+    depth: int
+    """0 for the outermost loops, -1 for clean-up passes."""
+
+    @property
+    def line(self) -> LineString:
+        points = np.vstack([self.points, self.points[:1]]) if self.closed else self.points
+        return LineString(points)
+
+
+def sharp_space(site: Site, space: FreeSpace, poles: list[tuple[float, float]]) -> list[Polygon]:
+    """The free space with corners instead of arcs around obstacles: fewer turns for a wheel.
+
+    It is a part of the free space; in tight places it is less than that.
+    """
+    radius = space.clearance + 0.0006
+    sharp = space.floor.buffer(-radius, join_style="mitre", mitre_limit=2.0)
+    things = [LineString(wall) for wall in site.walls]
+    if things:
+        boxes = shapely.buffer(
+            np.array(things), radius, cap_style="square", join_style="mitre", mitre_limit=2.0
+        )
+        sharp = sharp.difference(shapely.union_all(boxes))
+    if poles:
+        squares = shapely.buffer(shapely.points(poles), radius, cap_style="square")
+        sharp = sharp.difference(shapely.union_all(squares))
+    inside = shapely.intersection(sharp, space.polygon)
+    return [piece for piece in polygons(inside) if piece.area > 1e-4]
+
+
+def nested_loops(pieces: list[Polygon], tool_width: float, tolerance: float) -> list[Stroke]:
+    """The outlines of ``pieces``, and loops inside of them a little less than a tool width apart.
+
+    ``tolerance``: how far inner loops may be from the exact offset, metres, where that saves
+    vertices; the outermost ones keep to 1 mm and stay inside.
+    """
+    loops: list[Stroke] = []
+    for piece in pieces:
+        step = _fitted_step(piece, tool_width)
+        level = [piece]
+        depth = 0
+        while level:
+            following: list[Polygon] = []
+            for polygon in level:
+                if not polygon.buffer(-_THIN * tool_width / 2).is_empty:
+                    loops += _rings(polygon, depth, tolerance)
+                    inner = polygon.buffer(
+                        -step, join_style="mitre", mitre_limit=1.5, quad_segs=quadrant(step)
+                    )
+                    following += [
+                        part.simplify(0.001) for part in polygons(inner) if part.area > 1e-4
+                    ]
+            level = [part for part in following if part.is_valid and not part.is_empty]
+            depth += 1
+    return loops
+
+
+def _fitted_step(piece: Polygon, tool_width: float) -> float:
+    """The distance between loops that lets them end well in the widest place of the piece."""
+    widest = float(shapely.maximum_inscribed_circle(piece, tolerance=0.01).length)
+    largest = tool_width * (1 - OVERLAP)
+    inside = widest - tool_width / 2 + 0.005
+    if inside <= 0:
+        return largest
+    return max(0.8 * largest, inside / math.ceil(inside / largest))
+
+
+def _rings(polygon: Polygon, depth: int, tolerance: float) -> list[Stroke]:
+    if depth == 0:
+        inner = polygon.buffer(-0.0008, join_style="mitre").simplify(0.0008)
+    else:
+        inner = polygon.simplify(tolerance)
+    if inner.is_empty or not inner.is_valid:
+        inner = polygon
+    found: list[Stroke] = []
+    for part in polygons(inner):
+        for ring in (part.exterior, *part.interiors):
+            points = np.asarray(ring.coords, dtype=float)[:-1, :2]
+            if len(points) >= 3 and ring.length > 0.02:
+                found.append(Stroke(points if ring.is_ccw else points[::-1].copy(), True, depth))
+    return found
+
+
+def cleanup_strokes(
+    missed: shapely.Geometry, tool_width: float, space: FreeSpace, smallest: float
+) -> list[Stroke]:
+    """Passes along the patches of ``missed`` that are larger than ``smallest`` m²."""
+    opened = missed.buffer(-0.004, quad_segs=2).buffer(0.004, quad_segs=2)
+    strokes: list[Stroke] = []
+    pending = [patch for patch in polygons(opened) if patch.area >= smallest]
+    while pending:
+        patch = pending.pop()
+        box = shapely.minimum_rotated_rectangle(patch)
+        if not isinstance(box, Polygon):
+            continue
+        corners = np.asarray(box.exterior.coords, dtype=float)
+        if np.hypot(*(corners[1] - corners[0])) < np.hypot(*(corners[2] - corners[1])):
+            corners = np.vstack([corners[1:], corners[1:2]])
+        along, across = corners[1] - corners[0], corners[2] - corners[1]
+        length, width = float(np.hypot(*along)), float(np.hypot(*across))
+        if width > 0.9 * tool_width and patch.area > smallest / 4:
+            middle = (corners[0] + corners[1]) / 2
+            cut = Polygon([corners[0], middle, middle + across, corners[0] + across])
+            pending += [
+                part
+                for half in (patch.intersection(cut), patch.difference(cut))
+                for part in polygons(half)
+                if part.area > smallest / 4
+            ]
+            continue
+        strokes += _center_line(patch, corners[0], along, across, length, width, tool_width, space)
+    return strokes
+
+
+def _center_line(
+    patch: Polygon,
+    corner: Points,
+    along: Points,
+    across: Points,
+    length: float,
+    width: float,
+    tool_width: float,
+    space: FreeSpace,
+) -> list[Stroke]:
+    """The pass along the middle of a narrow patch, as far as the centre may go there."""
+    inset = math.sqrt(max(tool_width**2 - width**2, 0.0)) / 2
+    inset = min(0.9 * inset, length / 2 - 0.025) if length > 0.05 else 0.0
+    unit = along / max(length, 1e-9)
+    first = corner + across / 2 + unit * inset
+    last = corner + along + across / 2 - unit * inset
+    inside = shapely.intersection(LineString([first, last]), space.polygon)
+    found = [
+        Stroke(np.asarray(part.coords, dtype=float)[:, :2], False, -1)
+        for part in shapely.get_parts(inside).tolist()
+        if isinstance(part, LineString) and part.length > 0.02
+    ]
+    if found:
+        return found
+    center = patch.representative_point()
+    x, y = space.nearest((float(center.x), float(center.y)))
+    if math.dist((x, y), (center.x, center.y)) > tool_width / 2:
+        return []  # the tool gets no nearer
+    for turn in range(8):
+        angle = turn * math.pi / 4
+        there = np.array([[x, y], [x + 0.03 * math.cos(angle), y + 0.03 * math.sin(angle)]])
+        if space.holds_points(there):
+            return [Stroke(there, False, -1)]
+    return []

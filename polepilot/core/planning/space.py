@@ -1,0 +1,281 @@
+"""Where the robot's centre may be, what its disc can reach from the start, and what it cannot."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import LineString, MultiPolygon, Point, Polygon
+
+from polepilot.core import geometry
+from polepilot.core.errors import PlanError
+from polepilot.core.planning.options import PlanOptions
+from polepilot.core.site import Site, Start
+from polepilot.core.site_file import place
+
+MARGIN = 0.0003
+"""How much farther than the clearance the path stays away, so that chords of arcs keep it, m."""
+SLACK = 0.0002
+"""How far outside the free space a line may seem to be through rounding, m."""
+POLE_GAP = 0.01
+"""A pole whose surface is farther than this from everything stands free, m."""
+
+
+@dataclass(slots=True, eq=False)
+class FreeSpace:
+    """The free space for the robot's centre that is connected to the start."""
+
+    floor: MultiPolygon
+    """The floor itself: boundary without islands."""
+    lines: shapely.Geometry
+    """Free-standing walls."""
+    polygon: Polygon
+    """Where the centre may be: one piece, with the start."""
+    others: tuple[Polygon, ...]
+    """Where the centre might be as well if it could get there."""
+    clearance: float
+    start: Start
+    """Inside ``polygon``."""
+    notes: list[str] = field(default_factory=list)
+    _loose: Polygon = field(init=False)
+    _nodes: NDArray[np.float64] | None = field(init=False, default=None)
+    _seen: dict[int, tuple[NDArray[np.intp], NDArray[np.float64]]] = field(
+        init=False, default_factory=dict
+    )
+
+    def __post_init__(self) -> None:
+        self._loose = self.polygon.buffer(SLACK, join_style="mitre")
+        shapely.prepare(self._loose)
+
+    def holds(self, line: shapely.Geometry) -> bool:
+        """Whether the centre may move along all of ``line``."""
+        return bool(shapely.covers(self._loose, line))
+
+    def holds_points(self, points: NDArray[np.float64]) -> bool:
+        """Whether the centre may move along the line through N x 2 ``points``."""
+        if not shapely.intersects_xy(self._loose, points[:, 0], points[:, 1]).all():
+            return False
+        return len(points) < 2 or self.holds(LineString(points))
+
+    def reachable(self) -> MultiPolygon:
+        """The union of the clearance discs whose centres are in ``polygon``."""
+        return as_multi(self.polygon.buffer(self.clearance, quad_segs=quadrant(self.clearance)))
+
+    def nearest(self, point: geometry.Point) -> geometry.Point:
+        """The place of the free space nearest to ``point``."""
+        if shapely.intersects_xy(self.polygon, *point):
+            return point
+        line = shapely.shortest_line(self.polygon, Point(point))
+        return (float(line.coords[0][0]), float(line.coords[0][1]))
+
+    def shortest_path(self, a: geometry.Point, b: geometry.Point) -> list[geometry.Point] | None:
+        """The shortest line from ``a`` to ``b`` inside the free space; None where there is none.
+
+        A* on the visibility graph of the corners around which a shortest path can bend; what a
+        corner sees is computed when it is first needed and kept.
+        """
+        if self.holds(LineString([a, b])):
+            return [a, b]
+        nodes = self._bends()
+        count = len(nodes)
+        points = np.vstack([nodes, [a], [b]])
+        goal = count + 1
+        to_goal = np.hypot(*(points - points[goal]).T)
+        sees_goal = set(self._visible(points, goal, nodes)[0].tolist())
+        cost = {count: 0.0}
+        came: dict[int, int] = {}
+        queue = [(float(to_goal[count]), count)]
+        closed: set[int] = set()
+        while queue:
+            _, here = heapq.heappop(queue)
+            if here in closed:
+                continue
+            if here == goal:
+                trail = [goal]
+                while trail[-1] in came:
+                    trail.append(came[trail[-1]])
+                return [(float(points[i, 0]), float(points[i, 1])) for i in reversed(trail)]
+            closed.add(here)
+            if here < count:
+                if here not in self._seen:
+                    self._seen[here] = self._visible(points, here, nodes)
+                near, lengths = self._seen[here]
+            else:
+                near, lengths = self._visible(points, here, nodes)
+            steps = list(zip(near.tolist(), lengths.tolist(), strict=True))
+            if here in sees_goal:
+                steps.append((goal, float(to_goal[here])))
+            for there, length in steps:
+                total = cost[here] + length
+                if there not in closed and total < cost.get(there, math.inf):
+                    cost[there] = total
+                    came[there] = here
+                    heapq.heappush(queue, (total + float(to_goal[there]), there))
+        return None
+
+    def _bends(self) -> NDArray[np.float64]:
+        """Corners of the free space that point into it; shortest paths bend only there."""
+        if self._nodes is None:
+            for tolerance in (0.001, 0.005, 0.02, 0.05, 0.1, 0.2):
+                inner = self.polygon.buffer(-tolerance / 2, join_style="mitre").simplify(
+                    tolerance / 2
+                )
+                found = [corners for part in polygons(inner) for corners in _reflex(part)]
+                if len(found) <= 400:
+                    break
+            self._nodes = np.array(found, dtype=float).reshape(-1, 2)
+        return self._nodes
+
+    def _visible(
+        self, points: NDArray[np.float64], index: int, nodes: NDArray[np.float64]
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Which nodes are seen from a point, and how far away they are."""
+        here = points[index]
+        pairs = np.stack([np.broadcast_to(here, nodes.shape), nodes], axis=1)
+        lengths = np.hypot(*(nodes - here).T)
+        seen = np.flatnonzero(shapely.covers(self._loose, shapely.linestrings(pairs)))
+        seen = seen[(seen != index) & (lengths[seen] > 1e-9)]
+        return seen, lengths[seen]
+
+
+def free_space(site: Site, options: PlanOptions) -> FreeSpace:
+    """The free space that holds the start (``options``', else the site's, else the largest part).
+
+    Raises:
+        PlanError: the robot fits nowhere, or not at the start.
+    """
+    floor = site.floor()
+    if not floor.is_valid:
+        floor = shapely.make_valid(floor)
+    radius = options.clearance + MARGIN
+    segments = quadrant(radius)
+    free = floor.buffer(-radius, quad_segs=segments)
+    things = [LineString(wall) for wall in site.walls]
+    things += [Point(pole) for pole in free_poles(site)]
+    if things:
+        discs = shapely.buffer(np.array(things), radius, quad_segs=segments)
+        free = free.difference(shapely.union_all(discs))
+    pieces = sorted(
+        (piece for piece in polygons(free) if piece.area > 1e-6), key=lambda p: -float(p.area)
+    )
+    if not pieces:
+        raise PlanError(
+            f"the robot fits nowhere on the floor: with a clearance of {options.clearance:g} m "
+            f"it needs passages of {2 * options.clearance:g} m."
+        )
+    start = options.start or site.start
+    notes: list[str] = []
+    if start is None:
+        home = pieces[0]
+        x, y = _corner_start(home)
+        start = Start(x, y)
+    else:
+        home, start = _at_start(pieces, floor, start, options, notes)
+    return FreeSpace(
+        floor=as_multi(floor),
+        lines=shapely.union_all([LineString(wall) for wall in site.walls]),
+        polygon=home,
+        others=tuple(piece for piece in pieces if piece is not home),
+        clearance=options.clearance,
+        start=start,
+        notes=notes,
+    )
+
+
+def reachable_area(site: Site, options: PlanOptions) -> MultiPolygon:
+    """The union of the clearance discs whose centres are connected to the start.
+
+    Raises:
+        PlanError: as ``free_space``.
+    """
+    return free_space(site, options).reachable()
+
+
+def free_poles(site: Site) -> list[geometry.Point]:
+    """Axes of the landmarks that stand free on the floor; those at a wall belong to it."""
+    round_ones = [mark for mark in site.landmarks if mark.kind.shape == "cylinder"]
+    if not round_ones:
+        return []
+    points = shapely.points([mark.position for mark in round_ones])
+    distances = shapely.distance(site.obstacles(), points)
+    inside = shapely.covers(site.floor(), points)
+    return [
+        mark.position
+        for mark, distance, here in zip(round_ones, distances, inside, strict=True)
+        if here and distance > mark.kind.diameter / 2 + POLE_GAP
+    ]
+
+
+def _at_start(
+    pieces: list[Polygon],
+    floor: shapely.Geometry,
+    start: Start,
+    options: PlanOptions,
+    notes: list[str],
+) -> tuple[Polygon, Start]:
+    """The piece that holds the start. A start too near to a wall is moved, and that is said."""
+    spot = Point(start.position)
+    if not floor.intersects(spot):
+        raise PlanError(f"the start {place(start.position)} is not on the floor of the site.")
+    distance, home = min(
+        ((float(piece.distance(spot)), piece) for piece in pieces), key=lambda entry: entry[0]
+    )
+    if distance == 0:
+        return home, start
+    if distance > max(0.5 * options.clearance, 0.05) + 0.01:
+        raise PlanError(
+            f"the robot does not fit at the start {place(start.position)}: the nearest place with "
+            f"a clearance of {options.clearance:g} m is {distance:.2f} m away."
+        )
+    line = shapely.shortest_line(home, spot)
+    x, y = (float(value) for value in line.coords[0])
+    if distance > 0.001:
+        notes.append(
+            f"The start {place(start.position)} is nearer to a wall than {options.clearance:g} m; "
+            f"the path begins {distance * 100:.1f} cm away."
+        )
+    return home, Start(x, y, start.heading)
+
+
+def _corner_start(home: Polygon) -> geometry.Point:
+    """A place on the outline near its lower left corner: a plan for a site without a start."""
+    x, y = min(home.exterior.coords, key=lambda c: (c[0] + c[1], c[0]))[:2]
+    return (float(x), float(y))
+
+
+def _reflex(polygon: Polygon) -> list[geometry.Point]:
+    """Vertices of a polygon at which its inside has more than half a turn."""
+    found: list[geometry.Point] = []
+    for ring in (polygon.exterior, *polygon.interiors):
+        points = np.asarray(ring.coords)[:-1]
+        if (ring is polygon.exterior) != ring.is_ccw:
+            points = points[::-1]  # now the inside is on the left everywhere
+        before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
+        turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+        found += [(float(x), float(y)) for x, y in points[turn < 0]]
+    return found
+
+
+def quadrant(radius: float, error: float = MARGIN) -> int:
+    """Segments per quarter turn so that a buffer's chords are no farther than ``error`` inside."""
+    if radius <= 2 * error:
+        return 4
+    return max(8, min(128, math.ceil(math.pi / 4 / math.acos(1 - error / radius))))
+
+
+def polygons(shape: shapely.Geometry) -> list[Polygon]:
+    """The polygons of any shape, without lines, points and empty ones."""
+    return [
+        part
+        for part in shapely.get_parts(shape).tolist()
+        if isinstance(part, Polygon) and not part.is_empty
+    ]
+
+
+def as_multi(shape: shapely.Geometry) -> MultiPolygon:
+    """Any shape as a MultiPolygon."""
+    return MultiPolygon(polygons(shape))

@@ -1,0 +1,134 @@
+"""The floor that a tool has swept: exactly for predictions, on a raster for the robot's tick."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import cv2
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import MultiPolygon, Polygon
+
+from polepilot.core.geometry import Point
+
+_SHIFT = 6
+"""Fractional bits of OpenCV's drawing coordinates."""
+_MOST_CELLS = 30_000_000
+SMALLEST_PATCH = 0.01
+"""A missed patch smaller than this is not worth a visit, m²."""
+
+
+def swept_shape(path: NDArray[np.float64], tool_width: float) -> shapely.Geometry:
+    """What a disc of diameter ``tool_width`` sweeps along N x 2 points.
+
+    One capsule per segment, united: buffering the whole line overstates coverage.
+    """
+    steps = path[np.r_[True, np.hypot(*np.diff(path, axis=0).T) > 1e-9]]
+    if len(steps) < 2:
+        return shapely.Point(path[0]).buffer(tool_width / 2, quad_segs=16)
+    lines = shapely.linestrings(np.stack([steps[:-1], steps[1:]], axis=1))
+    return shapely.union_all(shapely.buffer(lines, tool_width / 2, quad_segs=16))
+
+
+class SweptArea:
+    """Which part of an area the tool has swept so far, on a grid of ``cell`` metres.
+
+    A cell counts as swept when its middle was under the tool. Each ``sweep`` touches only the
+    cells around one capsule.
+    """
+
+    def __init__(self, area: MultiPolygon, tool_width: float, cell: float = 0.02) -> None:
+        self.tool_width = tool_width
+        x0, y0, x1, y1 = area.bounds if not area.is_empty else (0.0, 0.0, 0.0, 0.0)
+        width, height = x1 - x0 + 0.1, y1 - y0 + 0.1
+        self.cell = max(cell, math.sqrt(width * height / _MOST_CELLS))
+        self._origin = (x0 - 0.05, y0 - 0.05)
+        shape = (math.ceil(height / self.cell) + 1, math.ceil(width / self.cell) + 1)
+        self._area = np.zeros(shape, np.uint8)
+        for polygon in area.geoms:
+            piece = np.zeros_like(self._area) if polygon.interiors else self._area
+            cv2.fillPoly(piece, [self._pixels(polygon.exterior)], 1, shift=_SHIFT)
+            if polygon.interiors:
+                holes = [self._pixels(ring) for ring in polygon.interiors]
+                cv2.fillPoly(piece, holes, 0, shift=_SHIFT)
+                self._area |= piece
+        self._left = self._area.copy()
+        self._total = int(np.count_nonzero(self._area))
+        self._missing = self._total
+
+    @property
+    def coverage(self) -> float:
+        """Share of the area that was swept, 0 to 1; 1 where there is no area."""
+        return 1.0 - self._missing / self._total if self._total else 1.0
+
+    @property
+    def swept_area(self) -> float:
+        """Swept part of the area, m²."""
+        return (self._total - self._missing) * self.cell**2
+
+    @property
+    def missed_area(self) -> float:
+        """The rest, m²."""
+        return self._missing * self.cell**2
+
+    def sweep(self, a: Point, b: Point) -> None:
+        """The tool has moved straight from ``a`` to ``b``."""
+        radius = self.tool_width / 2
+        ox, oy = self._origin
+        rows, columns = self._left.shape
+        left = math.floor((min(a[0], b[0]) - radius - ox) / self.cell) - 1
+        right = math.ceil((max(a[0], b[0]) + radius - ox) / self.cell) + 2
+        low = math.floor((min(a[1], b[1]) - radius - oy) / self.cell) - 1
+        high = math.ceil((max(a[1], b[1]) + radius - oy) / self.cell) + 2
+        left, right = max(left, 0), min(right, columns)
+        low, high = max(low, 0), min(high, rows)
+        if left >= right or low >= high:
+            return
+        window = self._left[low:high, left:right]
+        before = int(np.count_nonzero(window))
+        if not before:
+            return
+        x = ox + self.cell * np.arange(left, right) - a[0]
+        y = oy + self.cell * np.arange(low, high)[:, None] - a[1]
+        dx, dy = b[0] - a[0], b[1] - a[1]
+        squared = dx * dx + dy * dy
+        along = np.clip((x * dx + y * dy) / squared, 0.0, 1.0) if squared > 1e-12 else 0.0
+        window[(x - along * dx) ** 2 + (y - along * dy) ** 2 <= radius * radius] = 0
+        self._missing -= before - int(np.count_nonzero(window))
+
+    def missed(self) -> MultiPolygon:
+        """What is left, as patches in `map`; those under 0.01 m² are dropped."""
+        contours, tree = cv2.findContours(self._left, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
+        patches: list[shapely.Geometry] = []
+        half = self.cell / 2
+        for index, contour in enumerate(contours):
+            if tree[0][index][3] != -1:
+                continue  # a hole, taken with its outline
+            holes = []
+            child = tree[0][index][2]
+            while child != -1:
+                holes.append(self._ring(contours[child]))
+                child = tree[0][child][0]
+            outline = self._ring(contour)
+            # Contours run through the middles of cells; half a cell belongs to the patch around.
+            if len(outline) < 3:
+                line = shapely.LineString([*outline, outline[-1]])
+                shape = line.buffer(half, cap_style="square")
+            else:
+                polygon = Polygon(outline, [hole for hole in holes if len(hole) > 2])
+                shape = polygon.buffer(0).union(polygon.exterior).buffer(half, join_style="mitre")
+            if shape.area >= SMALLEST_PATCH:
+                patches.append(shape)
+        united = shapely.union_all(patches)
+        return MultiPolygon(
+            [part for part in shapely.get_parts(united).tolist() if isinstance(part, Polygon)]
+        )
+
+    def _ring(self, contour: NDArray[Any]) -> NDArray[np.float64]:
+        return np.asarray(contour[:, 0, :] * self.cell + np.array(self._origin), np.float64)
+
+    def _pixels(self, ring: shapely.LinearRing) -> NDArray[np.int32]:
+        points = (np.asarray(ring.coords)[:, :2] - self._origin) / self.cell
+        return np.asarray(np.round(points * (1 << _SHIFT)), np.int32)

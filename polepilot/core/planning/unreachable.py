@@ -1,0 +1,105 @@
+"""Floor that the robot's size keeps it out of, as polygons with a reason."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+import shapely.ops
+from shapely import LineString, MultiPolygon, Polygon
+
+from polepilot.core.geometry import Polyline
+from polepilot.core.plan import Unreachable
+from polepilot.core.planning.space import FreeSpace, polygons
+
+SMALLEST = 0.05
+"""Smaller pieces are not mentioned, m²."""
+_SLIVER = 0.003
+_MOST_REASONS = 25
+"""The largest pieces are looked into one by one; a map with more has other problems."""
+
+
+def unreachable_pieces(space: FreeSpace, reachable: MultiPolygon) -> tuple[Unreachable, ...]:
+    """The floor that ``reachable`` leaves, piece by piece, the largest first; rings are split."""
+    walls = space.lines.buffer(0.001) if not space.lines.is_empty else space.lines
+    rest = space.floor.difference(reachable.buffer(_SLIVER)).difference(walls)
+    pieces: list[tuple[Polygon, str]] = []
+    parts = [part for part in polygons(rest) if part.area >= SMALLEST * 0.8]
+    passages = _Passages(space)
+    for index, part in enumerate(sorted(parts, key=lambda p: -float(p.area))):
+        # Give back what was taken against slivers, but nothing of what is reachable.
+        grown = part.buffer(_SLIVER, join_style="mitre").intersection(space.floor)
+        whole = max(polygons(grown.difference(reachable)) or [part], key=lambda p: float(p.area))
+        if whole.area < SMALLEST:
+            continue
+        if index < _MOST_REASONS:
+            reason = passages.reason(whole)
+        else:
+            reason = f"the robot needs {2 * space.clearance:.2f} m of width to get in"
+        pieces += [(simple, reason) for simple in _without_holes(whole)]
+    return tuple(
+        Unreachable(_ring(piece), reason) for piece, reason in pieces if piece.area >= SMALLEST / 5
+    )
+
+
+class _Passages:
+    """How wide the way to a piece is, from free spaces for smaller robots."""
+
+    def __init__(self, space: FreeSpace) -> None:
+        self._space = space
+        self._levels: dict[float, list[Polygon]] = {}
+
+    def reason(self, piece: Polygon) -> str:
+        need = f"the robot needs {2 * self._space.clearance:.2f} m"
+        inner = [other for other in self._space.others if other.intersects(piece)]
+        if not inner:
+            circle = shapely.maximum_inscribed_circle(piece, tolerance=0.01)
+            width = 2 * float(circle.length)
+            if width < 2 * self._space.clearance:
+                return f"only {width:.2f} m wide, {need}"
+            return f"too narrow to get in, {need}"
+        target = max(inner, key=lambda p: float(p.area)).representative_point()
+        home = self._space.polygon.representative_point()
+        low, high = 0.004, self._space.clearance
+        if not self._joined(low, target, home):
+            return "enclosed: no opening leads there"
+        for _ in range(7):
+            middle = round((low + high) / 2, 4)
+            if self._joined(middle, target, home):
+                low = middle
+            else:
+                high = middle
+        return f"behind a passage of {2 * low:.2f} m, {need}"
+
+    def _joined(self, clearance: float, a: shapely.Point, b: shapely.Point) -> bool:
+        """Whether a robot of that clearance gets from ``a`` to ``b``."""
+        if clearance not in self._levels:
+            free = self._space.floor.buffer(-clearance, quad_segs=4)
+            if not self._space.lines.is_empty:
+                free = free.difference(self._space.lines.buffer(clearance, quad_segs=4))
+            self._levels[clearance] = polygons(free)
+        return any(part.intersects(a) and part.intersects(b) for part in self._levels[clearance])
+
+
+def _without_holes(piece: Polygon) -> list[Polygon]:
+    """A polygon with holes, cut through each hole's middle until no hole is left."""
+    done: list[Polygon] = []
+    pending = [piece]
+    while pending:
+        part = pending.pop()
+        if not part.interiors:
+            done.append(part)
+            continue
+        _, y0, _, y1 = part.bounds
+        x = float(Polygon(part.interiors[0]).representative_point().x)
+        cut = LineString([(x, y0 - 1), (x, y1 + 1)])
+        halves = polygons(shapely.ops.split(part, cut))
+        if len(halves) < 2:
+            done.append(Polygon(part.exterior))
+            continue
+        pending += halves
+    return done
+
+
+def _ring(piece: Polygon) -> Polyline:
+    points = np.asarray(piece.simplify(0.002).exterior.coords, dtype=float)[:-1, :2]
+    return tuple((round(float(x), 4), round(float(y), 4)) for x, y in points)

@@ -106,7 +106,8 @@ class Panel:
         with self._lock:
             server, self._server = self._server, None
         if server is not None:
-            server.stop()
+            with contextlib.redirect_stdout(io.StringIO()):
+                server.stop()
 
     def set_site(self, site: Site) -> None:
         """Show another site; trail, points and covered floor begin anew."""
@@ -158,10 +159,6 @@ class Panel:
 
     def _remember(self, snapshot: Snapshot) -> None:
         """Keep what grows, whether or not somebody looks."""
-        measured = snapshot.measured
-        if measured is not None and measured.stamp > self._last_measured:
-            self._last_measured = measured.stamp
-            self._measured.append((measured.pose.x, measured.pose.y, _MEASURED))
         mission = snapshot.mission
         if mission is not None and mission.run_id != self._run:
             self._run = mission.run_id
@@ -169,6 +166,10 @@ class Panel:
             self._measured.clear()
             if self._covered is not None:
                 self._covered.clear()
+        measured = snapshot.measured
+        if measured is not None and measured.stamp > self._last_measured:
+            self._last_measured = measured.stamp
+            self._measured.append((measured.pose.x, measured.pose.y, _MEASURED))
         if snapshot.estimate is None:
             return
         pose = snapshot.estimate.pose

@@ -21,6 +21,7 @@ from polepilot.core.errors import ConfigError
 from polepilot.core.landmark import LandmarkKind
 from polepilot.core.link.calibration import DriveCalibration
 from polepilot.core.link.usb import PortAddress
+from polepilot.core.localization.localizer import LocalizerSettings as Localization
 from polepilot.core.sim.motion import Disturbances
 from polepilot.core.vehicle import Camera, PanUnit, Proximity, RobotModel, Vehicle
 from polepilot.server.settings_errors import explain_syntax, explain_validation, refusal
@@ -133,6 +134,17 @@ class Settings(Section):
         )
 
     @property
+    def localization(self) -> Localization:
+        """What the localizer tolerates."""
+        return Localization(
+            method=self.localizer.method,
+            tolerance=self.localizer.tolerance_m,
+            degraded_after=self.localizer.degraded_after_s,
+            lost_after=self.localizer.lost_after_s,
+            lost_sigma=self.localizer.lost_sigma_m,
+        )
+
+    @property
     def port_address(self) -> PortAddress | None:
         """Where the board is plugged in; None for the simulated one."""
         return PortAddress.parse(self.link.port) if self.link.board == "serial" else None
@@ -210,7 +222,7 @@ def parse_settings(text: str, source: str) -> Settings:
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise ConfigError(explain_syntax(error, source)) from error
+        raise ConfigError(explain_syntax(error, source, text)) from error
     return _validated(document, source, text)
 
 

@@ -30,10 +30,12 @@ def refusal(key: str, read: Any, expected: str) -> PydanticCustomError:
     return PydanticCustomError("refused", "refused", {"key": key, "read": read, "words": expected})
 
 
-def explain_syntax(error: tomllib.TOMLDecodeError, source: str) -> str:
+def explain_syntax(error: tomllib.TOMLDecodeError, source: str, text: str) -> str:
     """``FILE: line 3, column 7: no TOML: ...``."""
     match = re.match(r"(.*?)\s*\(at (.*)\)$", str(error), re.DOTALL)
     what, where = match.groups() if match else (str(error), "an unknown place")
+    if where == "end of document":
+        where = f"line {max(1, len(text.splitlines()))}, at the end"
     return f"{source}: {where}: this is no TOML: {' '.join(what.split())}."
 
 

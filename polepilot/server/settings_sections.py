@@ -16,10 +16,12 @@ from polepilot.core.errors import ConfigError
 from polepilot.core.landmark import LandmarkKind
 from polepilot.core.link.calibration import DriveCalibration
 from polepilot.core.link.usb import PortAddress
+from polepilot.core.localization.localizer import LocalizerSettings as Localization
 from polepilot.core.vehicle import Camera, PanUnit, Proximity, Vehicle
 from polepilot.server.settings_errors import refusal
 
 _VEHICLE, _CAMERA, _PAN, _PROXIMITY = Vehicle(), Camera(), PanUnit(), Proximity()
+_LOCALIZER = Localization()
 _LANDMARK, _DRIVE = LandmarkKind(), DriveCalibration()
 
 Pair = Annotated[tuple[float, float], Field(strict=False)]
@@ -52,10 +54,13 @@ class CameraSettings(Section):
         description="column and row of the optical axis; without it the middle of the picture",
     )
     forward_m: float = Field(
-        default=_CAMERA.forward, description="pan axis ahead of the rear axle, metres"
+        default=_CAMERA.forward,
+        ge=-10,
+        le=10,
+        description="pan axis ahead of the rear axle, metres",
     )
     height_m: float = Field(
-        default=_CAMERA.mount_height, gt=0, description="lens above the floor, metres"
+        default=_CAMERA.mount_height, gt=0, le=10, description="lens above the floor, metres"
     )
     rate_hz: float = Field(
         default=_CAMERA.rate, gt=0, le=240, description="pictures per second asked for"
@@ -104,7 +109,7 @@ class PanSettings(Section):
         default=_PAN.maximum, ge=-math.tau, le=math.tau, description="end at the left, radians"
     )
     rate_rad_s: float = Field(
-        default=_PAN.rate, gt=0, description="rate at full duty, radians per second"
+        default=_PAN.rate, gt=0, le=100, description="rate at full duty, radians per second"
     )
     sweep_duty: float = Field(
         default=_PAN.sweep_duty, gt=0, le=1, description="share of the full duty while sweeping"
@@ -311,11 +316,39 @@ class LocalizerSettings(Section):
 
     method: Literal["ekf", "paper"] = Field(default="ekf", description='"ekf", or "paper"')
     tolerance_m: float = Field(
-        default=0.20,
+        default=_LOCALIZER.tolerance,
         gt=0,
         le=10,
         description="a contradiction beyond this stops the robot to fix its pose anew, metres",
     )
+    degraded_after_s: float = Field(
+        default=_LOCALIZER.degraded_after,
+        gt=0,
+        le=600,
+        description="driving this long without a correction: the pose counts as degraded, seconds",
+    )
+    lost_after_s: float = Field(
+        default=_LOCALIZER.lost_after,
+        gt=0,
+        le=600,
+        description="driving this long without a correction: the pose counts as lost, seconds",
+    )
+    lost_sigma_m: float = Field(
+        default=_LOCALIZER.lost_sigma,
+        gt=0,
+        le=10,
+        description="position known no better than this (standard deviation): lost, metres",
+    )
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> LocalizerSettings:
+        if self.lost_after_s < self.degraded_after_s:
+            raise refusal(
+                "lost_after_s",
+                self.lost_after_s,
+                f"at least degraded_after_s ({self.degraded_after_s})",
+            )
+        return self
 
 
 class LimitSettings(Section):
@@ -357,7 +390,10 @@ class ProximitySettings(Section):
         default=_PROXIMITY.angles, description="directions of left, centre, right sensor, radians"
     )
     forward_m: float = Field(
-        default=_PROXIMITY.forward, description="sensors ahead of the rear axle, metres"
+        default=_PROXIMITY.forward,
+        ge=-10,
+        le=10,
+        description="sensors ahead of the rear axle, metres",
     )
     max_range_m: float = Field(
         default=_PROXIMITY.max_range, gt=0, le=50, description="farthest reading, metres"

@@ -24,26 +24,34 @@ _HALF_LIGHT = 0.70
 """Half of the light as a share of the grey level: 0.5 ** (1/2.2) = 0.73, less the glow of black."""
 _COARSE_SHARE = 0.25
 """What is darker than this share of the coarse neighbourhood's brightest is not the bright paint."""
+_RED, _BLUE = 1.5, 2.0
+"""Colour = 1.5 red - 2 blue: grey stays below zero in light down to about 4000 K."""
 _FAINTEST = 10
 """Grey levels of colour below which everything counts as black."""
 
 
 def contrast(image: Image) -> Bytes:
-    """The signal in grey levels, rows x columns: red minus blue, or grey as it is."""
+    """The signal in grey levels, rows x columns: red where there is colour, or grey as it is.
+
+    Red itself, not the difference, tells bright from black where both are orange by half: JPEG
+    and cheap cameras keep brightness twice as sharp as colour.
+    """
     if image.ndim == 2:
         return image
-    signal: Bytes = cv2.subtract(cv2.extractChannel(image, 2), cv2.extractChannel(image, 0))
+    red, blue = cv2.extractChannel(image, 2), cv2.extractChannel(image, 0)
+    colour = cv2.addWeighted(red, _RED, blue, -_BLUE, 0.0)
+    signal: Bytes = cv2.min(red, colour)
     return signal
 
 
 def linear(patch: Image) -> Floats:
-    """The same signal in linear light (sRGB curve undone), 0 to 1, without clipping at zero.
+    """Red minus blue, or grey, in linear light (sRGB curve undone), -1 to 1.
 
     Edges are found in linear light because pixels average light, not grey levels.
     """
     if patch.ndim == 2:
         return _LINEAR[patch]
-    return _LINEAR[patch[:, :, 2]] - _LINEAR[patch[:, :, 0]]
+    return _LINEAR[patch[:, :, 2]]
 
 
 def bright(signal: Bytes) -> Bytes:

@@ -25,8 +25,12 @@ from polepilot.core.vision.strips import Strip, find_strips
 RANGE_FLOOR = 0.0006
 """Share of the range that is uncertain besides what the fit knows: blur that is not Gaussian,
 grey levels that are not quite sRGB, a camera that is not quite level."""
-COLUMN_FLOOR = 0.05
-"""The same for the strip's middle, pixels."""
+MOST_NOISE = 0.2
+"""Largest rms rest of a fit, as a share of the contrast."""
+COLUMN_FLOOR = 0.2
+"""The same for the strip's middle, pixels: light from one side moves the edges that are seen."""
+MODEL_FACTOR = 1.25
+"""By how much the scale is less certain than a fit with independent noise says."""
 
 
 class Detector(Protocol):
@@ -57,8 +61,8 @@ class LandmarkDetector:
     def detect(self, image: Image) -> list[Detection]:
         """All landmarks of a picture (rows x columns x 3 BGR, or grey), from left to right."""
         found: list[tuple[float, Detection]] = []
-        mask = color.bright(color.contrast(image))
-        for strip in find_strips(mask, self._bits):
+        signal = color.contrast(image)
+        for strip in find_strips(color.bright(signal), signal, self._bits):
             result = self._read(image, strip)
             if result is not None:
                 found.append(result)
@@ -74,7 +78,7 @@ class LandmarkDetector:
         top = strip.top
         for _ in range(2):
             scale = fit_scale(column, code, top, unit)
-            if scale is None:
+            if scale is None or not _plausible(scale):
                 return None
             levels = segment_levels(column, scale, len(code))
             if levels is None:
@@ -122,7 +126,7 @@ class LandmarkDetector:
         expected = 2 * half_width_of(distance, bearing, kind, camera)
         if abs(right - left - expected) > 0.35 * expected + 1.2:
             return None
-        relative = math.hypot(scale.unit_sigma / scale.unit, RANGE_FLOOR)
+        relative = math.hypot(MODEL_FACTOR * scale.unit_sigma / scale.unit, RANGE_FLOOR)
         return Detection(
             id=number,
             range=distance,
@@ -135,6 +139,11 @@ class LandmarkDetector:
             * math.cos(bearing) ** 2
             / camera.constant,
         )
+
+
+def _plausible(scale: Scale) -> bool:
+    """Whether a square wave explains the light well enough, without an absurd blur."""
+    return scale.noise < MOST_NOISE and scale.blur < max(1.0, 0.3 * scale.unit)
 
 
 def _best(found: list[tuple[float, Detection]]) -> list[Detection]:

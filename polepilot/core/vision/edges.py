@@ -26,6 +26,10 @@ _MARGIN = 1.2
 _STEEPEST = 0.2
 """Columns per row: twice what 60 degrees/s of pan and 2 degrees of roll amount to."""
 _ROUNDS = 6
+_NONLINEAR = 4
+"""Top, unit, blur, growth."""
+_GROWTH = 0.15
+"""How much bright segments may seem to grow (glare, grey levels averaged), pixels."""
 _RIDGE = 1e-9
 
 
@@ -166,11 +170,14 @@ def fit_scale(column: Column, code: str, top: float, unit: float) -> Scale | Non
     edges = np.concatenate([[0], edges, [segments]]).astype(np.float64)
     sign = np.ones(len(edges))
     sign[1::2] = -1
-    guess = np.array([top, unit, 0.6])
+    # Photon noise: the variance of light grows with the light, in all channels that take part.
+    trust = 1 / np.sqrt(np.abs(column.channels[:, [0, -1]]).sum(axis=1) + 0.02)
+    prior = np.zeros(_NONLINEAR)
+    guess = np.array([top, unit, 0.5, 0.0])
     start = guess.copy()
     for _ in range(_ROUNDS):
-        basis, slopes = _model(rows, guess, edges, sign, segments)
-        level = _solve(basis, light)
+        basis, slopes, spreads = _model(rows, guess, edges, sign, segments)
+        level = _solve(basis * trust[:, None], light * trust)
         if level is None:
             return None
         above, bright, gain, dark, tilt, below = level
@@ -180,17 +187,24 @@ def fit_scale(column: Column, code: str, top: float, unit: float) -> Scale | Non
         jump[:, 0] = bright + gain * shift - above
         jump[:, -1] = below - bright - gain * shift
         move = -jump * slopes
-        z = (rows[:, None] - (guess[0] + guess[1] * edges)) / guess[2]
-        jacobian = np.column_stack([basis, move.sum(axis=1), move @ edges, (move * z).sum(axis=1)])
-        rest = light - basis @ level
-        change = _solve(jacobian, rest)
+        jacobian = np.column_stack(
+            [basis, move.sum(axis=1), move @ edges, (jump * spreads).sum(axis=1), -move @ sign]
+        )
+        jacobian *= trust[:, None]
+        rest = (light - basis @ level) * trust
+        # A weak prior holds the growth of bright segments near nought where a code cannot tell.
+        prior[-1] = np.sqrt((rest @ rest) / max(len(rows) - 10, 1)) / _GROWTH
+        pull = np.zeros((1, jacobian.shape[1]))
+        pull[0, -1] = prior[-1]
+        jacobian = np.vstack([jacobian, pull])
+        change = _solve(jacobian, np.append(rest, -prior[-1] * guess[3]))
         if change is None:
             return None
-        delta = change[-3:]
-        limit = np.array([0.6 * start[1], 0.08 * start[1], 0.25])
+        delta = change[-_NONLINEAR:]
+        limit = np.array([0.6 * start[1], 0.08 * start[1], 0.25, 0.3])
         delta = np.clip(delta, -limit, limit)
         guess = guess + delta
-        guess[2] = min(max(guess[2], 0.3), 0.25 * guess[1] + 1.2)
+        guess[2] = min(max(guess[2], 0.2), 0.25 * guess[1] + 1.2)
         if abs(guess[0] - top) > unit + 1 or abs(guess[1] / unit - 1) > 0.2:
             return None
         if abs(delta[0]) < 1e-3 and abs(delta[1]) < 1e-4:
@@ -202,7 +216,7 @@ def fit_scale(column: Column, code: str, top: float, unit: float) -> Scale | Non
     variance = float(rest @ rest) / free
     normal = jacobian.T @ jacobian
     normal[np.diag_indices_from(normal)] *= 1 + _RIDGE
-    spread = np.linalg.pinv(normal)[-2, -2] * variance
+    spread = np.linalg.inv(normal)[-3, -3] * variance
     return Scale(
         top=float(guess[0]),
         unit=float(guess[1]),
@@ -210,14 +224,14 @@ def fit_scale(column: Column, code: str, top: float, unit: float) -> Scale | Non
         bright=float(bright),
         dark=float(dark),
         unit_sigma=math.sqrt(max(float(spread), 0.0)),
-        noise=math.sqrt(variance) / float(contrast),
+        noise=float(np.sqrt(np.mean((rest / trust) ** 2))) / float(contrast),
     )
 
 
 def segment_levels(column: Column, scale: Scale, segments: int) -> Floats | None:
     """Light of every segment with its neighbours' blur taken out: segments x channels."""
     edges = scale.top + scale.unit * np.arange(segments + 1)
-    steps = _step((column.rows[:, None] - edges) / scale.blur)
+    steps, _, _ = _step(column.rows[:, None] - edges, scale.blur)
     basis = np.column_stack([1 - steps[:, 0], steps[:, :-1] - steps[:, 1:], steps[:, -1]])
     normal = basis.T @ basis
     normal[np.diag_indices_from(normal)] += 1e-3
@@ -227,11 +241,9 @@ def segment_levels(column: Column, scale: Scale, segments: int) -> Floats | None
 
 def _model(
     rows: Floats, guess: Floats, edges: Floats, sign: Floats, segments: int
-) -> tuple[Floats, Floats]:
-    """What levels are multiplied by (rows x 6), and the slope of every step (rows x edges)."""
-    z = (rows[:, None] - (guess[0] + guess[1] * edges)) / guess[2]
-    steps = _step(z)
-    slopes = np.exp(-0.5 * z * z) / (guess[2] * math.sqrt(math.tau))
+) -> tuple[Floats, Floats, Floats]:
+    """What levels are multiplied by (rows x 6), and how steps change with place and blur."""
+    steps, slopes, spreads = _step(rows[:, None] - _boundaries(guess, edges, sign), guess[2])
     bright = steps @ sign
     inside = steps[:, 0] - steps[:, -1]
     dark = inside - bright
@@ -239,12 +251,36 @@ def _model(
     basis = np.column_stack(
         [1 - steps[:, 0], bright, bright * shift, dark, dark * shift, steps[:, -1]]
     )
-    return basis, slopes
+    return basis, slopes, spreads
 
 
-def _step(z: Floats) -> Floats:
+def _boundaries(guess: Floats, edges: Floats, sign: Floats) -> Floats:
+    """Rows of the boundaries; bright segments have grown by guess[3] at either end."""
+    place: Floats = guess[0] + guess[1] * edges - guess[3] * sign
+    return place
+
+
+def _step(x: Floats, blur: Floats | float) -> tuple[Floats, Floats, Floats]:
+    """A step at 0 seen by pixels at ``x``, and its derivatives by ``x`` and by ``blur``.
+
+    A pixel averages over its area what the lens has blurred: the step is the mean of the normal
+    distribution's cumulative function over one pixel.
+    """
+    before, after = (x - 0.5) / blur, (x + 0.5) / blur
+    low, high = _cumulative(before), _cumulative(after)
+    low_bell, high_bell = _bell(before), _bell(after)
+    step = blur * (after * high + high_bell - before * low - low_bell)
+    return step, high - low, high_bell - low_bell
+
+
+def _cumulative(z: Floats) -> Floats:
     """The normal distribution's cumulative function, to 2e-4 (no scipy needed)."""
     curve: Floats = 0.5 + 0.5 * np.tanh(0.7978845608 * z * (1 + 0.044715 * z * z))
+    return curve
+
+
+def _bell(z: Floats) -> Floats:
+    curve: Floats = np.exp(-0.5 * z * z) / math.sqrt(math.tau)
     return curve
 
 

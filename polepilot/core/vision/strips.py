@@ -24,6 +24,10 @@ _SLACK = 0.28
 """Share of a segment by which a run may miss its length or its place."""
 _ROUNDING = 0.85
 """Pixels by which whole-pixel runs may miss besides."""
+_LEAST_CONTRAST = 0.2
+"""Of the darker end bar over the brightest fence, as a share of the former."""
+_MOST_STRIPS = 40
+"""Strips that are looked at closer, the widest first."""
 _MOST_HITS = 4000
 """Columns that are looked at closer in one picture; a picture full of stripes has no landmark."""
 
@@ -43,16 +47,23 @@ class Strip:
     """How many columns agreed."""
 
 
-def find_strips(mask: Bytes, bits: Iterable[int]) -> list[Strip]:
-    """All strips in a mask (rows x columns, non-zero = bright) for codes of these bits."""
+def find_strips(mask: Bytes, signal: Bytes, bits: Iterable[int]) -> list[Strip]:
+    """All strips for codes of these bits.
+
+    Args:
+        mask: rows x columns, non-zero = bright.
+        signal: grey levels from which the mask was made.
+        bits: which codes to look for.
+    """
     column, start, end = _runs(mask)
     strips: list[Strip] = []
     for number in sorted(set(bits)):
         assert number in SUPPORTED_BITS
-        hits = _match(column, start, end, number)
+        hits = _contrasting(signal, *_match(column, start, end, number), number)
         if len(hits[0]):
             strips += _group(*hits, number)
-    return strips
+    strips.sort(key=lambda strip: -strip.columns)
+    return strips[:_MOST_STRIPS]
 
 
 def _runs(mask: Bytes) -> tuple[Ints, Ints, Ints]:
@@ -104,6 +115,26 @@ def _match(column: Ints, start: Ints, end: Ints, bits: int) -> tuple[Ints, Ints,
     merged = [np.concatenate(part) for part in zip(*found, strict=True)]
     order = np.argsort(merged[0], kind="stable")[:_MOST_HITS]
     return merged[0][order], merged[1][order], merged[2][order]
+
+
+def _contrasting(
+    signal: Bytes, column: Ints, top: Ints, bottom: Ints, bits: int
+) -> tuple[Ints, Ints, Ints]:
+    """Leave out what only noise has striped: end bars must clearly outshine all fences."""
+    segments = 2 * bits + 5
+    places = np.concatenate([[0.5, 1.5], np.arange(2, segments - 2, 2) + 0.5])
+    places = np.concatenate([places, [segments - 1.5, segments - 0.5]])
+    rows = top[:, None] + places * ((bottom - top) / segments)[:, None]
+    # A landmark is at least about three columns wide: their mean is less noisy than one.
+    last = signal.shape[1] - 1
+    light = sum(
+        signal[rows.astype(np.intp), np.clip(column + side, 0, last)[:, None]].astype(np.int32)
+        for side in (-1, 0, 1)
+    )
+    assert isinstance(light, np.ndarray)
+    ends = np.minimum(light[:, :2].max(axis=1), light[:, -2:].max(axis=1))
+    good = ends - light[:, 2:-2].max(axis=1) > _LEAST_CONTRAST * ends
+    return column[good], top[good], bottom[good]
 
 
 def _group(column: Ints, top: Ints, bottom: Ints, bits: int) -> list[Strip]:

@@ -37,6 +37,9 @@ Progress = Callable[[float, str], None]
 
 LONGEST = 200_000.0
 """A plan longer than this would not be a day's work but a year's, metres."""
+_CLOSER = (1.0, 0.0, 0.95, 0.9)
+"""Spacings that are tried; see ``nested_loops``."""
+_MANY = 60
 _SMALLEST = 0.008
 """Missed patches below this are left, m² for a tool of 0.4 m; scaled with its square."""
 
@@ -118,10 +121,29 @@ def _strokes(
     else:
         pieces = [space.polygon]
         tolerance = min(0.002, 0.01 * tool)
-    if whole:
-        strokes = nested_loops(pieces, tool, tolerance)
-    else:
-        strokes = _patch_strokes(pieces, target, tool, tolerance)
+    if not whole:
+        loops = _patch_strokes(pieces, target, tool, tolerance)
+        return _completed(loops, space, target, tool, smallest)
+    best: list[Stroke] = []
+    least = math.inf
+    for closer in _CLOSER:
+        loops = nested_loops(pieces, tool, tolerance, closer)
+        strokes = _completed(loops, space, target, tool, smallest)
+        # Each clean-up pass has to be gone to and left again.
+        extra = 2 * tool * (1 + (options.min_turn_radius > 0))
+        cost = sum(s.line.length + (0.0 if s.closed else extra) for s in strokes)
+        if strokes and cost < least:
+            best, least = strokes, cost
+        if len(loops) > _MANY:
+            break  # on a large map the spacing matters less than the time to think about it
+    return best
+
+
+def _completed(
+    loops: list[Stroke], space: FreeSpace, target: MultiPolygon, tool: float, smallest: float
+) -> list[Stroke]:
+    """Loops with the clean-up passes for what they miss of ``target``."""
+    strokes = list(loops)
     for _ in range(2):
         missed = target
         if strokes:

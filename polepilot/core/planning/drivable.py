@@ -133,22 +133,47 @@ class Driver:
             left_out += skipped
         return left_out
 
-    def begin(self, points: Points, cut: float) -> bool:
-        """Drives along ``points`` from where the track stands, its first leg included.
+    def head_for(self, place: geometry.Point) -> bool:
+        """Goes to ``place``, looking wherever: one curve and straight on, or what is cheaper.
 
-        The whole line must be driven: False, and the track as before, where that fails.
+        False, and the track as before, where no way is found.
         """
-        points = _tidy(points)
+        if math.dist(self.track.pose.position, place) < 1e-6:
+            return True
         saved = self._save()
-        step = points[1] - points[0]
-        heading, length = self._leg(step, float(np.hypot(*step)))
-        turned = self._turn_here(heading, length, math.inf) or self.connect(
-            (float(points[0, 0]), float(points[0, 1])), heading, back_out=False
-        )
-        if turned and self.follow(points, cut) == 0.0:
+        aimed = self._aim(place)
+        if aimed is not None and curve_length(aimed) < 1.5 * self._radius + math.dist(
+            self.track.pose.position, place
+        ):
+            self._append(aimed)
+            return True
+        if self.connect(place, None):
+            if aimed is None or self._cost_since(saved) <= _cost(aimed):
+                return True
+            self._restore(saved)
+        if aimed is not None:
+            self._append(aimed)
             return True
         self._restore(saved)
         return False
+
+    def _aim(self, place: geometry.Point) -> Curve | None:
+        """The shorter arc to where ``place`` lies straight ahead, and then straight to it."""
+        pose = self.track.pose
+        found: list[Curve] = []
+        for side, kind in ((1.0, "L"), (-1.0, "R")):
+            # Where the place lies as seen from the middle of the circle to that side.
+            x, y = pose.to_local(place)
+            y = side * y - self._radius
+            distance = math.hypot(x, y)
+            if distance <= self._radius:
+                continue
+            rest = math.sqrt(distance**2 - self._radius**2)
+            turn = (math.atan2(y, x) + math.atan2(self._radius, rest)) % math.tau
+            turn = 0.0 if turn > math.tau - 1e-9 else turn
+            found.append(((kind, turn * self._radius), ("S", rest)))
+        found.sort(key=curve_length)
+        return next((curve for curve in found if self._fits(pose, _joined(curve))), None)
 
     def connect(self, place: geometry.Point, heading: float | None, back_out: bool = True) -> bool:
         """Goes to ``place`` and stands there with ``heading`` (None: any); False: no way found.

@@ -59,15 +59,19 @@ def sharp_space(site: Site, space: FreeSpace, poles: list[tuple[float, float]]) 
     return [piece for piece in polygons(inside) if piece.area > 1e-4]
 
 
-def nested_loops(pieces: list[Polygon], tool_width: float, tolerance: float) -> list[Stroke]:
+def nested_loops(
+    pieces: list[Polygon], tool_width: float, tolerance: float, closer: float = 1.0
+) -> list[Stroke]:
     """The outlines of ``pieces``, and loops inside of them a little less than a tool width apart.
 
     ``tolerance``: how far inner loops may be from the exact offset, metres, where that saves
-    vertices; the outermost ones keep to 1 mm and stay inside.
+    vertices; the outermost ones keep to 1 mm and stay inside. ``closer``: loops may lie this
+    many times their largest distance apart, or 0: as it fits the widest place best.
     """
     loops: list[Stroke] = []
     for piece in pieces:
-        step = _fitted_step(piece, tool_width)
+        largest = tool_width * (1 - OVERLAP)
+        step = closer * largest if closer > 0 else _fitted_step(piece, tool_width, largest)
         level = [piece]
         depth = 0
         while level:
@@ -86,14 +90,13 @@ def nested_loops(pieces: list[Polygon], tool_width: float, tolerance: float) -> 
     return loops
 
 
-def _fitted_step(piece: Polygon, tool_width: float) -> float:
+def _fitted_step(piece: Polygon, tool_width: float, largest: float) -> float:
     """The distance between loops that lets them end well in the widest place of the piece."""
     widest = float(shapely.maximum_inscribed_circle(piece, tolerance=0.01).length)
-    largest = tool_width * (1 - OVERLAP)
     inside = widest - tool_width / 2 + 0.005
     if inside <= 0:
         return largest
-    return max(0.8 * largest, inside / math.ceil(inside / largest))
+    return max(0.75 * largest, inside / math.ceil(inside / largest))
 
 
 def _rings(polygon: Polygon, depth: int, tolerance: float) -> list[Stroke]:

@@ -21,9 +21,6 @@ from polepilot.core.planning.unreachable import unreachable_pieces
 from polepilot.core.site import Site
 from polepilot.core.site_file import place
 
-NEAR = 0.03
-"""How near to a node its corner is rounded, metres."""
-
 
 def plan_route(site: Site, route: str | Sequence[Point], options: PlanOptions) -> Plan:
     """The path from the start by way of the nodes of a named route, or of the given nodes.
@@ -113,39 +110,23 @@ def _ways(
 def _driven(
     name: str, ways: list[list[Point]], space: FreeSpace, options: PlanOptions
 ) -> tuple[NDArray[np.float64], NDArray[np.int8]]:
-    """The whole way with corners that a steered wheel can take."""
-    line = np.vstack([np.array(ways[0][:1]), *(np.array(way[1:]) for way in ways)])
-    line = line[np.r_[True, np.hypot(*np.diff(line, axis=0).T) > 1e-6]]
-    if len(line) < 2:
-        raise PlanError(f"route {name!r} ends where it starts: there is nothing to drive.")
-    first = line[1] - line[0]
-    ahead = math.atan2(first[1], first[0])
+    """The whole way with curves that a steered wheel can take.
+
+    From each node the wheel is turned until the robot looks at the next one, then straight on
+    (paper, Tracking Route); with changes of gear where that is shorter or does not fit.
+    """
     start = space.start
-    heading = ahead if start.heading is None else start.heading
+    heading = start.heading
+    if heading is None:
+        aim = next((p for way in ways for p in way if math.dist(p, start.position) > 1e-6), None)
+        aim = aim or start.position
+        heading = math.atan2(aim[1] - start.y, aim[0] - start.x)
     driver = Driver(space, options.min_turn_radius, Pose2D(start.x, start.y, heading))
-    if not driver.begin(line, NEAR):
-        # The first leg cannot be reached in its own direction: node by node, any heading.
-        for index, way in enumerate(ways):
-            if not driver.connect(way[-1], None):
-                raise PlanError(
-                    f"the drive to node {index + 1} of route {name!r} is not possible with a "
-                    f"turning radius of {options.min_turn_radius:g} m."
-                )
-        return driver.track.arrays()
-    path, gear = driver.track.arrays()
     for index, way in enumerate(ways):
-        node = np.array(way[-1])
-        if _distance(path, node) > 0.10:
-            raise PlanError(
-                f"the drive to node {index + 1} of route {name!r} is not possible with a "
-                f"turning radius of {options.min_turn_radius:g} m."
-            )
-    return path, gear
-
-
-def _distance(path: NDArray[np.float64], node: NDArray[np.float64]) -> float:
-    """From a point to a polyline."""
-    a, step = path[:-1], np.diff(path, axis=0)
-    squared = np.maximum((step**2).sum(axis=1), 1e-12)
-    along = np.clip(((node - a) * step).sum(axis=1) / squared, 0.0, 1.0)
-    return float(np.hypot(*(a + along[:, None] * step - node).T).min())
+        for goal in way[1:]:
+            if not driver.head_for(goal) and not driver.head_for(way[-1]):
+                raise PlanError(
+                    f"the drive to node {index + 1} of route {name!r} at {place(way[-1])} is not "
+                    f"possible with a turning radius of {options.min_turn_radius:g} m."
+                )
+    return driver.track.arrays()

@@ -4,8 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 from polepilot.core.link.messages import Telemetry
+
+
+class Chunk(NamedTuple):
+    """Bytes from the line, and when they came (seconds of the host's clock)."""
+
+    stamp: float
+    data: bytes
 
 
 class LinkState(StrEnum):

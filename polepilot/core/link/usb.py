@@ -16,6 +16,7 @@ import serial
 from serial.tools import list_ports
 
 from polepilot.core.errors import ConfigError, LinkError
+from polepilot.core.link.report import Chunk
 
 _RETRY_PERIOD = 1.0
 """Between two attempts to open, seconds."""
@@ -118,8 +119,10 @@ class SerialPort:
     def is_open(self) -> bool:
         return self._device is not None
 
-    def read(self) -> bytes:
-        """All bytes that have come, perhaps none; never blocks.
+    def read(self) -> list[Chunk]:
+        """What has come since the last call, perhaps nothing; never blocks.
+
+        The stamp is the time of reading: `HostLink` finds the regular time of the board in it.
 
         Raises:
             LinkError: the device is missing, busy, forbidden or was unplugged. Raised once for
@@ -127,16 +130,16 @@ class SerialPort:
         """
         descriptor = self._descriptor()
         if descriptor is None:
-            return b""
+            return []
         try:
             data = os.read(descriptor, _READ_SIZE)
         except BlockingIOError:
-            return b""
+            return []
         except OSError as error:
             raise self._gone(error) from error
         if not data and not self._alive():
             raise self._gone(None)
-        return data
+        return [Chunk(self._clock(), data)] if data else []
 
     def write(self, data: bytes) -> None:
         """Send ``data``; never blocks. What the device does not take now is sent later.

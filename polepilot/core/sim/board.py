@@ -50,6 +50,8 @@ PAN_TIMEOUT_MS = 1000
 TELEMETRY_PERIOD_MS = 20
 DUPLICATE_MS = 500
 """For so long a command with type, seq and payload of the last one is a repetition of it."""
+_PAN_MARGIN = 8
+"""ADC counts between the pan motor's end stops and the ends of its potentiometer."""
 _MAX_UNSENT = 4096
 """Bytes that wait to be read; telemetry that does not fit is dropped, as by a UART."""
 
@@ -69,6 +71,8 @@ class BoardSettings:
     pan_low: int = 8
     """ADC counts: at or below, the pan motor turns only back."""
     pan_high: int = 1015
+    pan_rising: bool = True
+    """Whether the counts rise as the camera turns left."""
     pan_stuck_ms: int = 1000
     pan_stuck_counts: int = 3
     pan_stuck_duty: int = 300
@@ -99,7 +103,14 @@ class BoardSettings:
             edge = max(0.0, -along + math.sqrt(discriminant)) if discriminant > 0 else 0.0
             limits.append(round((edge + proximity.hard_limit) * 1000))
         left, center, right = limits
-        return cls(features=features, hard_limits_mm=(left, center, right))
+        ends = sorted((model.pan.adc_at_minimum, model.pan.adc_at_maximum))
+        return cls(
+            features=features,
+            hard_limits_mm=(left, center, right),
+            pan_low=ends[0] + _PAN_MARGIN,
+            pan_high=ends[1] - _PAN_MARGIN,
+            pan_rising=model.pan.adc_at_minimum < model.pan.adc_at_maximum,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -296,8 +307,9 @@ class Board:
 
     def _pan_output(self) -> int:
         adc, settings = self._inputs.pan_adc, self._settings
-        at_low = self._pan < 0 and adc <= settings.pan_low
-        at_high = self._pan > 0 and adc >= settings.pan_high
+        rising = self._pan if settings.pan_rising else -self._pan
+        at_low = rising < 0 and adc <= settings.pan_low
+        at_high = rising > 0 and adc >= settings.pan_high
         if Features.PAN not in settings.features or at_low or at_high:
             return 0
         return 0 if self._pan * self._pan_stuck > 0 else self._pan

@@ -69,14 +69,14 @@ def read_until(port: SerialPort, wanted: bytes) -> bytes:
     data = b""
     deadline = time.monotonic() + 5
     while len(data) < len(wanted) and time.monotonic() < deadline:
-        data += port.read()
+        data += b"".join(chunk.data for chunk in port.read())
     return data
 
 
 def test_bytes_pass_both_ways_unchanged(plug: Plug) -> None:
     port = SerialPort(PortAddress(path=str(plug.path)))
     everything = bytes(range(256))
-    assert port.read() == b""
+    assert port.read() == []
     assert port.generation == 1
     port.write(everything)
     assert plug.read() == everything
@@ -103,10 +103,10 @@ def test_missing_device_is_told_once_and_found_later(plug: Plug) -> None:
     assert "Check the cable" in told.value.remedy
     for _ in range(5):
         clock.time += 1.0
-        assert port.read() == b""
+        assert port.read() == []
         port.write(b"nobody hears this")
     plug.insert()
-    assert port.read() == b""
+    assert port.read() == []
     assert port.generation == 0, "tried again within a second"
     clock.time += 1.0
     port.read()
@@ -123,7 +123,7 @@ def test_unplugging_raises_once_and_plugging_in_opens_again(plug: Plug) -> None:
     with pytest.raises(LinkError, match="unplugged"):
         port.read()
     assert not port.is_open
-    assert port.read() == b""
+    assert port.read() == []
     plug.insert()
     clock.time += 1.0
     port.read()
@@ -237,11 +237,12 @@ def run(link: HostLink, port: SerialPort, until: LinkState, seconds: float = 10.
         now = time.monotonic()
         assert now < deadline, f"still {link.state}, not {until}"
         try:
-            data = port.read()
+            chunks = port.read()
             if port.generation != generation:
                 generation = port.generation
                 link.reset(now)
-            link.receive(data, now)
+            for chunk in chunks:
+                link.receive(chunk.data, chunk.stamp)
             port.write(link.poll(now))
         except LinkError as error:
             link.port_lost(now, str(error))

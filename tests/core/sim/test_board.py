@@ -24,7 +24,7 @@ from polepilot.core.link.messages import (
     Pan,
 )
 from polepilot.core.sim.board import Board, BoardInputs, BoardSettings
-from polepilot.core.vehicle import RobotModel
+from polepilot.core.vehicle import PanUnit, RobotModel
 
 NOTHING_NEAR = (1500, 1500, 1500)
 
@@ -171,6 +171,21 @@ def test_hard_limits_are_measured_from_the_body() -> None:
         reach = limit / 1000 - 0.08
         tip = (0.12 + reach * math.cos(angle), reach * math.sin(angle))
         assert math.hypot(*tip) == pytest.approx(0.14, abs=0.001)
+
+
+def test_pan_ends_follow_the_potentiometer() -> None:
+    assert BoardSettings.from_model(RobotModel()) == BoardSettings()
+    mirrored = RobotModel(pan=PanUnit(adc_at_minimum=900, adc_at_maximum=100))
+    fitted = BoardSettings.from_model(mirrored)
+    assert (fitted.pan_low, fitted.pan_high, fitted.pan_rising) == (108, 892, False)
+    port = SimulatedPort(Board(fitted))
+    bench = Bench(port)
+    bench.hello()
+    port.set_pins(pan_adc=100)
+    bench.ask(Pan(500))
+    assert port.pan_output() == 0, "left is where the counts fall"
+    bench.ask(Pan(-500))
+    assert port.pan_output() == -500
 
 
 def test_a_slew_limit_slower_than_the_rule_is_refused() -> None:

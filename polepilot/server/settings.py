@@ -17,11 +17,13 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError, model_validator
 
+from polepilot.core.control.supervisor import Limits
 from polepilot.core.errors import ConfigError
 from polepilot.core.landmark import LandmarkKind
 from polepilot.core.link.calibration import DriveCalibration
 from polepilot.core.link.usb import PortAddress
 from polepilot.core.localization.localizer import LocalizerSettings as Localization
+from polepilot.core.robot.robot import RobotSettings
 from polepilot.core.sim.motion import Disturbances
 from polepilot.core.vehicle import Camera, PanUnit, Proximity, RobotModel, Vehicle
 from polepilot.server.settings_errors import explain_syntax, explain_validation, refusal
@@ -142,6 +144,28 @@ class Settings(Section):
             degraded_after=self.localizer.degraded_after_s,
             lost_after=self.localizer.lost_after_s,
             lost_sigma=self.localizer.lost_sigma_m,
+        )
+
+    @property
+    def supervision(self) -> Limits:
+        """What the supervisor does not let pass."""
+        return Limits(
+            max_speed=self.limits.max_speed_m_s,
+            max_acceleration=self.vehicle.max_acceleration_m_s2,
+            max_estimate_age=self.limits.max_estimate_age_s,
+            max_link_age=self.limits.max_link_age_s,
+            max_position_sigma=self.limits.max_position_sigma_m,
+            degraded_share=self.limits.degraded_share,
+        )
+
+    @property
+    def robot(self) -> RobotSettings:
+        """All of the above together, as the robot takes it."""
+        return RobotSettings(
+            model=self.model,
+            calibration=self.calibration,
+            localizer=self.localization,
+            limits=self.supervision,
         )
 
     @property

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from polepilot.core.control.supervisor import Limits
 from polepilot.core.errors import ConfigError
 from polepilot.core.landmark import LandmarkKind
 from polepilot.core.link.calibration import DriveCalibration
@@ -22,7 +23,7 @@ from polepilot.server.settings_errors import refusal
 
 _VEHICLE, _CAMERA, _PAN, _PROXIMITY = Vehicle(), Camera(), PanUnit(), Proximity()
 _LOCALIZER = Localization()
-_LANDMARK, _DRIVE = LandmarkKind(), DriveCalibration()
+_LANDMARK, _DRIVE, _LIMITS = LandmarkKind(), DriveCalibration(), Limits()
 
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 Triple = Annotated[tuple[float, float, float], Field(strict=False)]
@@ -237,7 +238,7 @@ class LinkSettings(Section):
         description='"/dev/polepilot" or another path, or VID:PID[:SERIAL] in hexadecimal such as '
         '"0403:6001"',
     )
-    baud: int = Field(default=115200, ge=1200, le=4_000_000, description="bits per second")
+    baud_rate: int = Field(default=115200, ge=1200, le=4_000_000, description="bits per second")
 
     @model_validator(mode="after")
     def _fits_together(self) -> LinkSettings:
@@ -352,34 +353,34 @@ class LocalizerSettings(Section):
 
 
 class LimitSettings(Section):
-    """What the supervisor does not let pass."""
+    """What the supervisor does not let pass, whoever asks for it."""
 
     max_speed_m_s: float = Field(
-        default=_VEHICLE.max_speed,
+        default=_LIMITS.max_speed, gt=0, le=10, description="metres per second, at most"
+    )
+    max_estimate_age_s: float = Field(
+        default=_LIMITS.max_estimate_age,
         gt=0,
         le=10,
-        description="metres per second, whoever asks for more",
+        description="stand when the pose estimate is older, seconds",
     )
-    pose_age_s: float = Field(
-        default=0.5, gt=0, le=10, description="stop when the pose estimate is older, seconds"
-    )
-    landmark_age_s: float = Field(
-        default=8.0,
+    max_link_age_s: float = Field(
+        default=_LIMITS.max_link_age,
         gt=0,
-        le=600,
-        description="stop when no landmark was seen for this long, seconds",
+        le=5,
+        description="stand when the last telemetry is older, seconds",
     )
-    link_age_s: float = Field(
-        default=0.25, gt=0, le=5, description="stop when the last telemetry is older, seconds"
+    max_position_sigma_m: float = Field(
+        default=_LIMITS.max_position_sigma,
+        gt=0,
+        le=10,
+        description="stand when the position is known no better (standard deviation), metres",
     )
-    camera_age_s: float = Field(
-        default=2.0, gt=0, le=60, description="stop when the last picture is older, seconds"
-    )
-    position_sigma_m: float = Field(
-        default=0.25, gt=0, le=10, description="stop when the position is known no better, metres"
-    )
-    battery_v: float = Field(
-        default=0.0, ge=0, le=100, description="stop below this voltage; 0 does not look"
+    degraded_share: float = Field(
+        default=_LIMITS.degraded_share,
+        gt=0,
+        le=1,
+        description="share of the speed that is left while the pose is degraded",
     )
 
 

@@ -11,11 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from polepilot.core.control.supervisor import Limits
 from polepilot.core.errors import ConfigError
 from polepilot.core.landmark import LandmarkKind
 from polepilot.core.link.calibration import DriveCalibration
 from polepilot.core.link.usb import PortAddress
 from polepilot.core.localization.localizer import LocalizerSettings
+from polepilot.core.robot.robot import RobotSettings
 from polepilot.core.sim.motion import Disturbances
 from polepilot.core.vehicle import RobotModel
 from polepilot.server import settings_docs
@@ -37,6 +39,8 @@ def test_no_file_is_the_simulated_robot() -> None:
     assert Settings().landmark_kind == LandmarkKind()
     assert Settings().calibration == DriveCalibration()
     assert Settings().localization == LocalizerSettings()
+    assert Settings().supervision == Limits()
+    assert Settings().robot == RobotSettings()
     assert Settings().port_address is None
 
 
@@ -68,6 +72,7 @@ def test_values_reach_the_core() -> None:
         lost_after_s = 5
         [limits]
         max_speed_m_s = 0.2
+        max_link_age_s = 0.4
         [proximity]
         angles_rad = [0.5, 0, -0.5]
         """,
@@ -85,6 +90,8 @@ def test_values_reach_the_core() -> None:
     assert read.calibration.full_speed_right == 0.52
     assert read.calibration.counts_per_metre == 1200
     assert read.localization == LocalizerSettings(method="paper", lost_after=5)
+    assert read.robot.limits == Limits(max_speed=0.2, max_link_age=0.4)
+    assert read.robot.model == model
     assert model.proximity.angles == (0.5, 0, -0.5)
 
 
@@ -263,8 +270,7 @@ def test_any_value_is_taken_or_refused_in_one_line(changes: dict[tuple[str, str]
         # What is taken can be used: nothing fails later in the core.
         assert read.model.vehicle.min_turn_radius > 0
         assert read.landmark_kind.height > 0
-        assert read.calibration
-        assert read.localization
+        assert read.robot.model == read.model
 
 
 @given(st.text(max_size=200))

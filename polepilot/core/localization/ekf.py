@@ -9,6 +9,7 @@ to centimetres (the paper's one-landmark correction never corrects the heading).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -17,10 +18,13 @@ from numpy.typing import NDArray
 
 from polepilot.core.geometry import Pose2D, wrap_angle
 from polepilot.core.landmark import Landmark
-from polepilot.core.localization.odometry import Step, advance_with_jacobians
+from polepilot.core.localization.odometry import OdometryHistory, Step, advance_with_jacobians
 from polepilot.core.observation import RangeBearing
 
 Array = NDArray[np.float64]
+
+_WIDE = (0.3, 0.3, math.radians(8.0))
+"""Standard deviations before the sightings of a fix are taken in, metres and radians."""
 
 STATES = 10
 SPEED, STEERING, RANGE, PAN = 3, 4, 5, 6
@@ -36,23 +40,23 @@ class NoiseModel:
 
     speed_prior: float = 0.04
     speed_walk: float = 0.002
-    speed_noise: float = 0.025
+    speed_noise: float = 0.03
     steering_prior: float = math.radians(1.5)
     steering_walk: float = math.radians(0.02)
-    steering_noise: float = math.radians(0.25)
+    steering_noise: float = math.radians(0.3)
     servo_doubt: float = 0.2
     """Error of the modelled wheel angle while the servo is on its way, as a share of that way."""
     skid: float = 0.004
     """Unmodelled motion in any direction, metres per square root of a metre driven."""
     range_prior: float = 0.005
     pan_priors: tuple[float, float, float, float] = tuple(  # type: ignore[assignment]
-        math.radians(a) for a in (0.3, 0.3, 0.4, 0.3)
+        math.radians(a) for a in (0.3, 0.6, 0.4, 0.6)
     )
     pan_range: float = math.radians(135)
     """Half of the pan range; the Legendre polynomials live on it."""
-    range_floor: float = 0.004
+    range_floor: float = 0.006
     """Added to every range's error: landmarks are surveyed to a few millimetres."""
-    bearing_floor: float = math.radians(0.10)
+    bearing_floor: float = math.radians(0.20)
     """Added to every bearing's error: quantization, and what four coefficients do not describe."""
     survey_sigma: float = 0.005
     position_limit: float = 0.004
@@ -106,6 +110,32 @@ class PoseFilter:
         self.covariance[:3, :3] = covariance
         self.covariance[:3, 3:] = 0.0
         self.covariance[3:, :3] = 0.0
+
+    def begin(
+        self,
+        pose: Pose2D,
+        stamp: float,
+        sightings: Sequence[tuple[RangeBearing, Landmark]],
+        history: OdometryHistory,
+    ) -> None:
+        """Start at a fix, ``pose`` at ``stamp``, by taking its ``sightings`` in, oldest first.
+
+        The fix serves as the point of linearization only. Its own covariance would not say how
+        its error hangs together with the potentiometer's, and be counted twice.
+        """
+        start = min([stamp, *(sighting.stamp for sighting, _ in sightings)])
+        factor, offset = self.speed_factor, self.steering_offset
+        before = history.advance(pose, stamp, start, factor, offset)
+        self.reset(before, np.diag(np.square(_WIDE)))
+        for sighting, landmark in sightings:
+            for step in history.steps(start, sighting.stamp):
+                self.predict(step)
+            start = max(start, sighting.stamp)
+            innovation = self.innovation(sighting, landmark)
+            if innovation.squared <= self.gate:
+                self.update(innovation)
+        for step in history.steps(start, stamp):
+            self.predict(step)
 
     @property
     def speed_factor(self) -> float:
@@ -171,8 +201,9 @@ class PoseFilter:
         distance = max(math.hypot(dx, dy), 1e-3)
         ux, uy = dx / distance, dy / distance
         jacobian = np.zeros((2, STATES))
-        jacobian[0, 0], jacobian[0, 1] = -ux, -uy
-        jacobian[0, 2] = ux * arm_y - uy * arm_x
+        scale = 1.0 + float(state[RANGE])
+        jacobian[0, 0], jacobian[0, 1] = -ux * scale, -uy * scale
+        jacobian[0, 2] = (ux * arm_y - uy * arm_x) * scale
         jacobian[0, RANGE] = distance
         jacobian[1, 0], jacobian[1, 1] = uy / distance, -ux / distance
         jacobian[1, 2] = -(uy * arm_y + ux * arm_x) / distance - 1.0
@@ -188,7 +219,7 @@ class PoseFilter:
             + (noise.survey_sigma / distance) ** 2
         )
         if math.isfinite(measurement.range) and math.isfinite(measurement.range_sigma):
-            range_gap = measurement.range - distance * (1.0 + float(state[RANGE]))
+            range_gap = measurement.range - distance * scale
             range_variance = measurement.range_sigma**2 + noise.range_floor**2
         else:
             range_gap, range_variance = 0.0, 1e6

@@ -266,7 +266,11 @@ class Localizer:
         self._begin(stamp, found)
 
     def _begin(self, stamp: float, found: Fix) -> None:
-        self._filter.reset(found.pose, found.covariance)
+        if isinstance(self._filter, PoseFilter):
+            sightings = [(m, self._landmarks[m.landmark]) for m in self._search.used]
+            self._filter.begin(found.pose, stamp, sightings, self._history)
+        else:
+            self._filter.reset(found.pose, found.covariance)
         self._track, self._ahead = _Track(self._filter, stamp), None
         self._measured = (stamp, found.pose)
         self._status, self._reason = Status.TRACKING, ""

@@ -44,6 +44,9 @@ class FixSearch:
     refusal: FixRefusal = _NOTHING
     """Why the last attempt gave nothing."""
 
+    used: tuple[RangeBearing, ...] = ()
+    """The sightings behind the last fix, as they were measured, oldest first."""
+
     def clear(self) -> None:
         self._sightings.clear()
         self.refusal = _NOTHING
@@ -94,6 +97,7 @@ class FixSearch:
                 answer.outliers,
             )
             return None
+        self.used = tuple(m for m in chosen if m.landmark in answer.landmarks)
         return answer
 
     def _carry(self, sighting: RangeBearing, stamp: float) -> tuple[RangeBearing, Pose2D] | None:

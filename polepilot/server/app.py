@@ -10,13 +10,13 @@ from fastapi import APIRouter, FastAPI
 from fastapi.openapi.utils import get_openapi
 from starlette.websockets import WebSocket
 
-from polepilot.server.version import VERSION
 from polepilot.server import errors
 from polepilot.server.page import mount_page
 from polepilot.server.proxy import mount_panel
 from polepilot.server.routes import metrics, missions, plans, robot, runs, simulation, sites
 from polepilot.server.schemas import Problem, SiteDocument
 from polepilot.server.security import Security
+from polepilot.server.version import VERSION
 
 if TYPE_CHECKING:
     from polepilot.server.services import Services

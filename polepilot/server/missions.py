@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import structlog
 from starlette.concurrency import run_in_threadpool
 
-from polepilot.core.errors import PlanError, PolepilotError, RefusedError
+from polepilot.core.errors import PlanError, PolepilotError, RefusedError, SiteError
 from polepilot.core.robot.recorder import Recorder
 from polepilot.core.site import Site, parse_site
 from polepilot.server.convert import Job, coordinates_of, plan_of
@@ -77,12 +76,9 @@ class Missions:
 
     async def load_last_site(self) -> None:
         """Give the robot the site that it had when the service ended."""
-        remembered = await run_in_threadpool(self._store.setting, _SITE_SETTING)
-        known = [line.id for line in await run_in_threadpool(self._store.sites)]
-        if not known:
-            return
-        site_id = int(remembered) if remembered else known[0]
-        await self.load_site(site_id if site_id in known else known[0])
+        site_id = await run_in_threadpool(_last_site_id, self._store)
+        if site_id is not None:
+            await self.load_site(site_id)
 
     def close(self) -> None:
         """Finish what is still to be written; after the runner has ended."""
@@ -130,7 +126,7 @@ class Missions:
             if self._runner.job is not None:
                 raise _mission_active()
             if self._twin is not None:
-                self._twin.set_site(site)
+                self._twin.set_site(site, another=self._runner.site_id != row.id)
             robot.load_site(site)
             self._runner.site_id = row.id
 
@@ -183,7 +179,7 @@ class Missions:
         if published is None or self._runner.site_id != site_id:
             return None
         estimate = published.snapshot.estimate
-        return None if estimate is None else tuple(estimate.pose)
+        return None if estimate is None else (*estimate.pose.position, estimate.pose.heading)
 
     async def _pending(self, wanted: PlanRequest, run_id: int) -> list[Any]:
         run = await run_in_threadpool(self._store.run, run_id)
@@ -253,9 +249,7 @@ class Missions:
                 remedy="Place at least two landmarks.",
             )
         driven = await run_in_threadpool(plan_of, plan)
-        recorder = Recorder(
-            self._log_path(row.id), wall_start=time.time(), stamp_start=self._runner.clock.now()
-        )
+        recorder = self._recorder(row.id)
         job = Job(run_id=row.id, plan_id=plan.id, site_id=plan.site_id, route=plan.route)
 
         def start(robot: RobotPort) -> None:
@@ -271,6 +265,17 @@ class Missions:
         except BaseException:
             await run_in_threadpool(recorder.close)
             raise
+
+    def _recorder(self, run_id: int) -> Recorder:
+        twin, published = self._twin, self._runner.latest
+        assert published is not None
+        wall, stamp = published.around.wall, published.snapshot.stamp
+        return Recorder(
+            self._log_path(run_id),
+            wall_start=wall,
+            stamp_start=stamp,
+            witness=None if twin is None else lambda: twin.truth,
+        )
 
     def run_ended(self, summary: RunSummary) -> None:
         """The robot's callback, in its own thread: must return at once."""
@@ -301,7 +306,7 @@ class Missions:
             if self._runner.job is not None:
                 return
             if self._twin is not None:
-                self._twin.set_site(site)
+                self._twin.set_site(site, another=False)
             robot.load_site(site)
             self._loaded, self._outdated = row, False
 
@@ -356,6 +361,23 @@ class Missions:
         if path.parent.is_dir() and not any(path.parent.iterdir()):
             path.parent.rmdir()
         self._store.drop_run(run_id)
+
+
+def last_site(store: Store) -> Site | None:
+    """The site that the robot had when the service ended; None where there is none to use."""
+    site_id = _last_site_id(store)
+    try:
+        return None if site_id is None else _parse(store.site(site_id))
+    except SiteError:
+        return None
+
+
+def _last_site_id(store: Store) -> int | None:
+    remembered = store.setting(_SITE_SETTING)
+    known = [line.id for line in store.sites()]
+    if remembered is not None and int(remembered) in known:
+        return int(remembered)
+    return known[0] if known else None
 
 
 def _parse(row: SiteRow) -> Site:

@@ -63,27 +63,25 @@ class RobotPort(Protocol):
     def shutdown(self, now: float) -> None: ...
 
 
-class Obstacle(Protocol):
-    """A disc in the way, metres in `map`."""
-
-    @property
-    def x(self) -> float: ...
-    @property
-    def y(self) -> float: ...
-    @property
-    def radius(self) -> float: ...
-
-
 class Twin(Protocol):
-    """The simulated world; there is none on hardware."""
+    """The simulated world; there is none on hardware. Time is what the robot's clock makes of it.
+    All of it is called from the runner's thread only."""
 
-    def advance(self, to: float) -> None: ...
-    def truth(self) -> Pose2D: ...
     @property
-    def obstacles(self) -> Sequence[Obstacle]: ...
+    def truth(self) -> Pose2D:
+        """Where the robot really is."""
+        ...
+
+    @property
+    def obstacles(self) -> tuple[tuple[float, float, float], ...]:
+        """Discs in the way: x, y, radius."""
+        ...
+
     def set_obstacles(self, discs: Sequence[tuple[float, float, float]]) -> None: ...
     def place(self, pose: Pose2D) -> None: ...
-    def set_site(self, site: Site) -> None: ...
+    def set_site(self, site: Site, *, another: bool) -> None:
+        """Change walls and poles. On ``another`` site the robot is carried to the start."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,6 +141,7 @@ class Runner:
         self.sighting: Sighting | None = None
         self.failed = False
         self.ticks = 0
+        self.failures = 0
         self.site_id: int | None = None
         """The site that the robot works on; written by commands only."""
         self.job: Job | None = None
@@ -212,13 +211,12 @@ class Runner:
     def _tick(self, now: float) -> bool:
         done = self._execute()
         try:
-            if self._twin is not None:
-                self._twin.advance(now)
             snapshot = self._robot.step(now)
             self.sighting = self._robot.sighting
             self._publish(snapshot, now, at_once=bool(done))
-        except Exception as error:  # noqa: BLE001 - whatever it is, the wheels must stop
+        except Exception as error:
             log.error("the robot's tick failed", error=str(error), exc_info=error)
+            self.failures += 1
             self._stop_wheels(error)
             return False
         finally:
@@ -250,10 +248,8 @@ class Runner:
         around = Surroundings(
             wall=time.time(),
             loop=self._meter.loop,
-            real=None if twin is None else twin.truth(),
-            obstacles=()
-            if twin is None
-            else tuple((disc.x, disc.y, disc.radius) for disc in twin.obstacles),
+            real=None if twin is None else twin.truth,
+            obstacles=() if twin is None else twin.obstacles,
             site_id=self.site_id,
             job=self.job,
         )
@@ -265,13 +261,13 @@ class Runner:
     def _stop_wheels(self, error: Exception) -> None:
         try:
             self._robot.stop(f"internal fault: {error}")
-        except Exception as second:  # noqa: BLE001 - nothing is left to try but the next tick
+        except Exception as second:
             log.error("the robot does not stop", error=str(second), exc_info=second)
 
     def _end(self, *, failed: bool) -> None:
         try:
             self._robot.shutdown(self._clock.now())
-        except Exception as error:  # noqa: BLE001 - the thread ends anyway
+        except Exception as error:
             log.error("the robot did not shut down", error=str(error), exc_info=error)
             failed = True
         with self._lock:

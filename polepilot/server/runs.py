@@ -121,7 +121,7 @@ def finish_log(path: Path) -> bool:
                 channels[channel] = writer.register_channel(channel, "json", schema)
             writer.add_message(channels[channel], stamp, data, stamp)
             count += 1
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
         file.flush()
         os.fsync(file.fileno())
     if count:

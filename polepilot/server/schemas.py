@@ -430,4 +430,5 @@ class FeatureCollection(Model):
     """GeoJSON in local metres; the property ``role`` says what each feature is."""
 
     type: Literal["FeatureCollection"]
+    name: str = ""
     features: list[dict[str, Any]]

@@ -89,9 +89,7 @@ class Security:
                 remedy=f"Open http://127.0.0.1:{self._port()}/ instead.",
             )
         if any(origin.lower() not in {f"http://{a}" for a in allowed} for origin in origins):
-            return problem(
-                403, "Another page has asked; only our own may.", code="foreign_origin"
-            )
+            return problem(403, "Another page has asked; only our own may.", code="foreign_origin")
         return None
 
     def _addresses(self) -> set[str]:

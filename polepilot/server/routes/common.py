@@ -1,4 +1,4 @@
-"""What the routes share: where the services are, what problems look like in the OpenAPI document."""
+"""What the routes share: where the services are, and what the OpenAPI document says of problems."""
 
 from __future__ import annotations
 

@@ -14,9 +14,7 @@ from polepilot.server.schemas import PlanRecord, PlanRequest
 router = APIRouter(prefix="/plans", tags=["plans"])
 
 
-@router.post(
-    "", status_code=201, response_model=PlanRecord, responses=problems(404, 409, 422, 503)
-)
+@router.post("", status_code=201, response_model=PlanRecord, responses=problems(404, 409, 422, 503))
 async def add_plan(services: ServicesDep, wanted: PlanRequest) -> Any:
     """Compute a plan and keep it."""
     return plan_record(await services.missions.plan(wanted))

@@ -7,11 +7,11 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Response
 from starlette.concurrency import run_in_threadpool
 
-from polepilot.server.version import VERSION
 from polepilot.server.convert import model_document
 from polepilot.server.errors import NotFoundError
 from polepilot.server.routes.common import ServicesDep, problems
 from polepilot.server.schemas import About, SiteChoice, Snapshot
+from polepilot.server.version import VERSION
 
 router = APIRouter(tags=["robot"])
 
@@ -50,7 +50,7 @@ async def choose_site(services: ServicesDep, choice: SiteChoice) -> Response:
 @router.post("/robot/stop", response_model=Snapshot, responses=problems(503))
 async def stop(services: ServicesDep) -> Response:
     """Emergency stop: wheels off at once, latched until it is cleared."""
-    await services.runner.call(lambda robot: robot.stop("stopped by hand"), urgent=True)
+    await services.runner.call(lambda robot: robot.stop("Emergency stop by hand."), urgent=True)
     return snapshot_response(services)
 
 

@@ -31,7 +31,7 @@ def _twin(services: ServicesDep) -> Twin:
 
 
 def _document(twin: Twin) -> dict[str, Any]:
-    return {"obstacles": [{"x": d.x, "y": d.y, "radius": d.radius} for d in twin.obstacles]}
+    return {"obstacles": [{"x": x, "y": y, "radius": radius} for x, y, radius in twin.obstacles]}
 
 
 @router.get("", response_model=Simulation, responses=problems(409, 503))

@@ -125,16 +125,19 @@ async def check_site(document: JsonObject) -> Any:
 
 
 # Before "/{site_id}", which would take the suffix for a part of the number.
-@router.get(
-    "/{site_id}.geojson", response_model=FeatureCollection, responses=problems(404, 422)
-)
+@router.get("/{site_id}.geojson", response_model=FeatureCollection, responses=problems(404, 422))
 async def get_geojson(services: ServicesDep, site_id: PathId) -> Any:
     """The site as GeoJSON in local metres."""
     row = await run_in_threadpool(services.store.site, site_id)
     return await run_in_threadpool(lambda: _parse(row.document).to_geojson())
 
 
-@router.get("/{site_id}", response_model=SiteRecord, response_model_exclude_unset=True, responses=problems(404, 422))
+@router.get(
+    "/{site_id}",
+    response_model=SiteRecord,
+    response_model_exclude_unset=True,
+    responses=problems(404, 422),
+)
 async def get_site(services: ServicesDep, site_id: PathId, response: Response) -> Any:
     """The newest version of a site."""
     return _answer(response, await run_in_threadpool(services.store.site, site_id))
@@ -165,9 +168,7 @@ async def change_site(
 
 
 @router.delete("/{site_id}", status_code=204, responses=problems(404, 409, 412, 422, 428))
-async def delete_site(
-    services: ServicesDep, site_id: PathId, if_match: IfMatch = None
-) -> Response:
+async def delete_site(services: ServicesDep, site_id: PathId, if_match: IfMatch = None) -> Response:
     """Take a site off the list; its runs keep what they drove by."""
     version = version_of(if_match)
     services.missions.refuse_if_in_use(site_id)
@@ -175,9 +176,7 @@ async def delete_site(
     return Response(status_code=204)
 
 
-@router.get(
-    "/{site_id}/versions", response_model=list[SiteVersion], responses=problems(404, 422)
-)
+@router.get("/{site_id}/versions", response_model=list[SiteVersion], responses=problems(404, 422))
 async def list_versions(services: ServicesDep, site_id: PathId) -> Any:
     """All versions, oldest first."""
     rows = await run_in_threadpool(services.store.site_versions, site_id)
@@ -185,7 +184,10 @@ async def list_versions(services: ServicesDep, site_id: PathId) -> Any:
 
 
 @router.get(
-    "/{site_id}/versions/{version}", response_model=SiteRecord, response_model_exclude_unset=True, responses=problems(404, 422)
+    "/{site_id}/versions/{version}",
+    response_model=SiteRecord,
+    response_model_exclude_unset=True,
+    responses=problems(404, 422),
 )
 async def get_version(
     services: ServicesDep, site_id: PathId, version: PathId, response: Response

@@ -10,10 +10,7 @@ from typing import Annotated
 
 import typer
 
-
-class Mode(StrEnum):
-    scan = "scan"
-    route = "route"
+from polepilot.commands.plan import JobMode, LoopOrder
 
 
 class Sensing(StrEnum):
@@ -21,14 +18,9 @@ class Sensing(StrEnum):
     measured = "measured"
 
 
-class Order(StrEnum):
-    default = "default"
-    paper = "paper"
-
-
 def simulate(
     site_file: Annotated[Path, typer.Argument(metavar="SITE.json", help="The drawn map.")],
-    mode: Annotated[Mode, typer.Option(help="Cover the area, or follow a route.")],
+    mode: Annotated[JobMode, typer.Option(help="Cover the area, or follow a route.")],
     out: Annotated[Path, typer.Option(help="Folder for trajectories and the log.")],
     route: Annotated[str | None, typer.Option(help="Name of the route, with --mode route.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of all chance in the simulation.")] = 1,
@@ -43,14 +35,15 @@ def simulate(
     clearance: Annotated[float | None, typer.Option(help="From the centre to a wall, m.")] = None,
     min_turn_radius: Annotated[float | None, typer.Option(help="Metres.")] = None,
     start: Annotated[str | None, typer.Option(metavar="X,Y[,HEADING]")] = None,
-    order: Annotated[Order, typer.Option(help="Of the loops.")] = Order.default,
+    order: Annotated[LoopOrder, typer.Option(help="Of the loops.")] = LoopOrder.DEFAULT,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document.")] = False,
 ) -> None:
     """Drive a plan with the simulated robot and say how well it went."""
-    from polepilot.commands.plan import make_plan
+    from polepilot.commands.plan import make_plan, parse_start
     from polepilot.commands.progress import mission_progress
     from polepilot.commands.simulation import Simulation
     from polepilot.core.errors import InputError, RefusedError
+    from polepilot.core.planning.options import PlanOptions
     from polepilot.core.site import read_site
     from polepilot.server.settings import load_settings
 
@@ -62,17 +55,15 @@ def simulate(
             "2 to know where it is.",
             code="no_landmarks",
         )
-    plan = make_plan(
-        site,
-        mode=mode.value,
-        route=route,
-        vehicle=settings.model.vehicle,
+    options = PlanOptions.from_vehicle(
+        settings.model.vehicle,
         tool_width=tool_width,
         clearance=clearance,
         min_turn_radius=min_turn_radius,
-        start=start,
+        start=None if start is None else parse_start(start),
         order=order.value,
     )
+    plan = make_plan(site, mode, route, options)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -111,7 +111,7 @@ class Mission:
         wanted = self._tracker.update(estimate.pose, dt)
         if self.done:
             return Step(STAND, self.target)
-        return self._avoid(now, estimate, proximity, wanted)
+        return self._go_round(now, estimate, proximity, wanted)
 
     def observe(self, pose: Pose2D) -> None:
         """Add where the robot is now to what it has swept and travelled."""

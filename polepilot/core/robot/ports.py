@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 from polepilot.core.landmark import LandmarkKind
+from polepilot.core.link.report import Chunk
 from polepilot.core.observation import Detection, Frame
 
 
@@ -21,13 +22,6 @@ class Sighting:
     """Middle of the exposure of the middle row."""
     detections: tuple[Detection, ...]
     frame: Frame | None = None
-
-
-class Chunk(NamedTuple):
-    """Bytes that came together, and when: a tick reads them later, and pan angles are timed."""
-
-    stamp: float
-    data: bytes
 
 
 class CameraPort(Protocol):
@@ -64,6 +58,11 @@ class SensorPort(Protocol):
 
 class LinkPort(Protocol):
     """A byte stream to the microcontroller."""
+
+    @property
+    def generation(self) -> int:
+        """How often the line has been opened; a new number asks for a new handshake."""
+        ...
 
     def read(self) -> list[Chunk]:
         """What has come since the last call, oldest first, perhaps nothing; never blocks.

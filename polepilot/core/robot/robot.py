@@ -90,6 +90,7 @@ class Robot:
         self._paused: str | None = None
         self._was_fixed = False
 
+        self._generation = link.generation
         self._now = 0.0
         self._last_tick: float | None = None
         self._last_moving = 0.0
@@ -247,9 +248,14 @@ class Robot:
     def _sample(self, now: float) -> None:
         """Bytes and pictures that have come."""
         try:
-            for chunk in self._port.read():
+            chunks = self._port.read()
+            if self._port.generation != self._generation:
+                self._generation = self._port.generation
+                self._host.reset(now)
+            for chunk in chunks:
                 self._host.receive(chunk.data, chunk.stamp)
-            self._clear_fault("link")
+            if self._host.ready:
+                self._clear_fault("link")
         except LinkError as error:
             self._host.port_lost(now, str(error))
             self._fault("link", str(error))

@@ -40,9 +40,13 @@ class PathTracker:
     A cursor, bounded to a short window, remembers how far it has come; it never runs back and
     never jumps to a neighbouring pass. The end of a stretch counts as reached when the robot has
     passed it, however far aside, so that nothing is circled for ever.
+
+    Args:
+        rolling: the command that is being carried out, where the robot is to change over to this
+            path without stopping.
     """
 
-    def __init__(self, plan: Plan, vehicle: Vehicle) -> None:
+    def __init__(self, plan: Plan, vehicle: Vehicle, rolling: DriveCommand = STAND) -> None:
         self._vehicle = vehicle
         self._stretches = cut(plan, vehicle)
         self._index = 0
@@ -52,6 +56,7 @@ class PathTracker:
         self._hold: float | None = 0.0
         self._speed = 0.0
         self._steering = 0.0
+        self._roll(rolling)
         self._idle_way = 0.0
         self._mark = 0.0
         self._target: Point = (float(plan.path[0, 0]), float(plan.path[0, 1]))
@@ -106,8 +111,12 @@ class PathTracker:
             return f"{self._idle_way:.1f} m driven without getting ahead on the path"
         return ""
 
-    def resume_at(self, progress: float) -> None:
-        """Take the path up again ``progress`` metres from its start (clamped to its ends)."""
+    def resume_at(self, progress: float, rolling: DriveCommand = STAND) -> None:
+        """Take the path up again ``progress`` metres from its start (clamped to its ends).
+
+        Args:
+            rolling: as for the tracker itself.
+        """
         progress = min(max(progress, 0.0), self.length)
         self._index = 0
         while (
@@ -119,6 +128,7 @@ class PathTracker:
             self._along = progress - self._stretches[self._index].begin
         self._begin_stretch(standing=abs(self._speed) < CREEP)
         self._distance = 0.0
+        self._roll(rolling)
 
     def path_ahead(
         self, horizon: float
@@ -183,6 +193,11 @@ class PathTracker:
         if self._along > self._mark + 0.05:
             self._mark, self._idle_way = self._along, 0.0
         return DriveCommand(stretch.gear * self._speed, steering)
+
+    def _roll(self, command: DriveCommand) -> None:
+        if command.speed * self.gear >= CREEP:
+            self._hold = None
+            self._speed, self._steering = abs(command.speed), command.steering
 
     def _begin_stretch(self, *, standing: bool) -> None:
         self._hold = 0.0 if standing else STOP_TIME

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -22,7 +23,8 @@ from polepilot.core.vehicle import Camera
 
 Colour = tuple[float, float, float]
 """Linear reflectance, blue-green-red."""
-Floats = NDArray[np.float32]
+Floats = NDArray[Any]
+"""float32 throughout; the stubs of OpenCV do not say so."""
 
 SIGHT_MARGIN = 0.10
 """The line of sight ends this far short of a pole's axis: poles standing at a wall are seen."""
@@ -373,8 +375,8 @@ class Renderer:
         patch = patch[:, skip : skip + end - (columns.start + skip)]
         target = picture[rows.start : rows.stop, columns.start + skip : end]
         target *= 1 - patch[:, :, :1]
-        target += patch[:, :, 1:2] * np.float32(look.bright)
-        target += patch[:, :, 2:] * np.float32(look.dark)
+        target += patch[:, :, 1:2] * np.array(look.bright, np.float32)
+        target += patch[:, :, 2:] * np.array(look.dark, np.float32)
 
     def _expose(self, picture: Floats) -> Image:
         codes = cv2.multiply(picture, self._gain)
@@ -383,8 +385,7 @@ class Renderer:
         if self._look.noise > 0:
             start = int(self._rng.integers(len(self._noise) - grey.size))
             grey += self._noise[start : start + grey.size].reshape(grey.shape)
-        image: Image = cv2.convertScaleAbs(np.maximum(grey, 0, out=grey))
-        return image
+        return np.asarray(cv2.convertScaleAbs(np.maximum(grey, 0, out=grey)), np.uint8)
 
 
 def _samples(pixels: range, fine: int) -> Floats:
@@ -411,11 +412,13 @@ def _box(length: float) -> Floats:
     half = math.ceil((length - 1) / 2) if length > 1 else 1
     offset = np.abs(np.arange(-half, half + 1))
     weight = np.clip(length / 2 + 0.5 - offset, 0, 1) if length > 1 else np.array([0, 1, 0])
-    return (weight / weight.sum()).astype(np.float32)[None, :]
+    kernel: Floats = (weight / weight.sum()).astype(np.float32)[None, :]
+    return kernel
 
 
 def _gamma_table() -> NDArray[np.int16]:
     """Linear light in 12 bits to sRGB grey levels."""
     linear = np.arange(_CODES) / (_CODES - 1)
     curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.rint(curve * 255).astype(np.int16)
+    table: NDArray[np.int16] = np.rint(curve * 255).astype(np.int16)
+    return table

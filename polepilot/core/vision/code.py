@@ -7,13 +7,14 @@ Every bit must look like one of the two, in every channel; anything in between i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polepilot.core.landmark import decode
 
-Floats = NDArray[np.float64]
+Floats = NDArray[np.floating[Any]]
 
 _TOLERANCE = 0.30
 """How far a segment may be from its colour, as a share of the distance between the two."""

@@ -21,9 +21,9 @@ _NEIGHBOURHOOD = 13
 _BLOCK = 10
 """Rows per block of the coarse neighbourhood."""
 _HALF_LIGHT = 0.70
-"""Half of the light as a share of the grey level: 0.5 ** (1/2.2) = 0.73, less the glow of black."""
+"""Half of the light as a share of the grey level: 0.5 ** (1/2.2) = 0.73, less what black adds."""
 _COARSE_SHARE = 0.25
-"""What is darker than this share of the coarse neighbourhood's brightest is not the bright paint."""
+"""Of the coarse neighbourhood's brightest: what is darker is not the bright paint."""
 _RED, _BLUE = 1.5, 2.0
 """Colour = 1.5 red - 2 blue: grey stays below zero in light down to about 4000 K."""
 _FAINTEST = 10
@@ -40,14 +40,14 @@ def contrast(image: Image) -> Bytes:
         return image
     red, blue = cv2.extractChannel(image, 2), cv2.extractChannel(image, 0)
     colour = cv2.addWeighted(red, _RED, blue, -_BLUE, 0.0)
-    signal: Bytes = cv2.min(red, colour)
-    return signal
+    return np.asarray(cv2.min(red, colour), np.uint8)
 
 
 def linear(patch: Image) -> Floats:
-    """Red minus blue, or grey, in linear light (sRGB curve undone), -1 to 1.
+    """Red, or grey, in linear light (sRGB curve undone), 0 to 1.
 
-    Edges are found in linear light because pixels average light, not grey levels.
+    Edges are found in linear light because pixels average light, not grey levels. Red alone: the
+    difference of two channels holds no brightness, which is what JPEG keeps sharp.
     """
     if patch.ndim == 2:
         return _LINEAR[patch]
@@ -63,8 +63,7 @@ def bright(signal: Bytes) -> Bytes:
     near = cv2.dilate(signal, np.ones((_NEIGHBOURHOOD, 1), np.uint8))
     floor = np.maximum(_coarse(signal), _FAINTEST)
     level = np.maximum(cv2.convertScaleAbs(near, alpha=_HALF_LIGHT), floor)
-    mask: Bytes = cv2.compare(signal, level, cv2.CMP_GT)
-    return mask
+    return np.asarray(cv2.compare(signal, level, cv2.CMP_GT), np.uint8)
 
 
 def _coarse(signal: Bytes) -> Bytes:
@@ -77,10 +76,9 @@ def _coarse(signal: Bytes) -> Bytes:
         padded[:rows] = signal
     peak = padded.reshape(blocks, _BLOCK, columns).max(axis=1)
     reach = blocks // 2 | 1
-    peak = cv2.dilate(peak, np.ones((reach, 1), np.uint8))
-    share = cv2.convertScaleAbs(peak, alpha=_COARSE_SHARE)
-    coarse: Bytes = np.repeat(share, _BLOCK, axis=0)[:rows]
-    return coarse
+    widest = cv2.dilate(peak, np.ones((reach, 1), np.uint8))
+    share = np.asarray(cv2.convertScaleAbs(widest, alpha=_COARSE_SHARE), np.uint8)
+    return np.repeat(share, _BLOCK, axis=0)[:rows]
 
 
 def _linear_table() -> Floats:

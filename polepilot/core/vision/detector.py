@@ -29,6 +29,8 @@ MOST_NOISE = 0.2
 """Largest rms rest of a fit, as a share of the contrast."""
 COLUMN_FLOOR = 0.2
 """The same for the strip's middle, pixels: light from one side moves the edges that are seen."""
+LEAN_SHARE = 6.0
+"""The same, in pixels per unit of slope of a leaning strip."""
 MODEL_FACTOR = 1.25
 """By how much the scale is less certain than a fit with independent noise says."""
 
@@ -75,25 +77,25 @@ class LandmarkDetector:
         if column is None:
             return None
         unit = (strip.bottom - strip.top) / len(code)
-        top = strip.top
+        # A segment misread at whole pixels shows in the levels: fit again with what they say.
         for _ in range(2):
-            scale = fit_scale(column, code, top, unit)
-            if scale is None or not _plausible(scale):
+            scale = fit_scale(column, code, strip.top, unit)
+            if scale is None:
                 return None
             levels = segment_levels(column, scale, len(code))
             if levels is None:
                 return None
             reading = read_code(levels, scale.noise / math.sqrt(max(scale.unit, 1.0)))
-            if reading.id is None or reading.code == code:
-                break
+            if reading.id is None:
+                return None
+            if reading.code == code:
+                kind = self._kinds.get(reading.id)
+                if kind is None or kind.bits != strip.bits or not _plausible(scale):
+                    return None
+                detection = self._measure(reading.id, kind, column, scale)
+                return None if detection is None else (scale.noise, detection)
             code = reading.code
-        if reading.id is None or reading.code != code:
-            return None
-        kind = self._kinds.get(reading.id)
-        if kind is None or kind.bits != strip.bits:
-            return None
-        detection = self._measure(reading.id, kind, column, scale)
-        return None if detection is None else (scale.noise, detection)
+        return None
 
     def _measure(
         self, number: int, kind: LandmarkKind, column: Column, scale: Scale
@@ -104,7 +106,8 @@ class LandmarkDetector:
         left, right = (
             side + column.slope * (middle - column.middle) for side in (column.left, column.right)
         )
-        sigma = column.edge_sigma
+        # Straightening leaves some of a lean: a steep strip is less certain.
+        sigma = math.hypot(column.edge_sigma, LEAN_SHARE * column.slope)
         if math.isfinite(left) and math.isfinite(right):
             at = (left + right) / 2
             sigma /= math.sqrt(2)

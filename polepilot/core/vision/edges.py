@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -19,7 +20,7 @@ from polepilot.core.observation import Image
 from polepilot.core.vision.color import linear
 from polepilot.core.vision.strips import Strip
 
-Floats = NDArray[np.float64]
+Floats = NDArray[np.floating[Any]]
 
 _MARGIN = 1.2
 """Segments above and below the code that take part in the fit."""
@@ -120,7 +121,8 @@ def straighten(image: Image, strip: Strip, code: str, aspect: float) -> Column |
         matrix = np.array([[1.0, slope, -slope * (middle - row0)], [0.0, 1.0, 0.0]])
         size = (patch.shape[1], patch.shape[0])
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        patch = cv2.warpAffine(patch, matrix, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        upright = cv2.warpAffine(patch, matrix, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        patch = np.asarray(upright, np.uint8)
         light = linear(patch)
     across = light[bright].mean(axis=0) - light[dark].mean(axis=0)
     across = across.astype(np.float64)
@@ -145,7 +147,7 @@ def straighten(image: Image, strip: Strip, code: str, aspect: float) -> Column |
     front = float(weight @ np.sqrt(np.maximum(1 - side**2, 0)))
     flat = patch.reshape(*patch.shape[:2], -1)
     channels = np.stack(
-        [_light_of(flat[:, :, channel]) @ weight for channel in range(flat.shape[2])], axis=1
+        [linear(flat[:, :, channel]) @ weight for channel in range(flat.shape[2])], axis=1
     )
     step_noise = float(spread) / peak / math.sqrt(max(min(bright.sum(), dark.sum()), 1))
     return Column(
@@ -166,8 +168,8 @@ def fit_scale(column: Column, code: str, top: float, unit: float) -> Scale | Non
     rows, light = column.rows, column.profile
     segments = len(code)
     values = np.array([int(c) for c in code])
-    edges = np.flatnonzero(np.diff(values)) + 1
-    edges = np.concatenate([[0], edges, [segments]]).astype(np.float64)
+    changes = np.flatnonzero(np.diff(values)) + 1
+    edges = np.concatenate([[0], changes, [segments]]).astype(np.float64)
     sign = np.ones(len(edges))
     sign[1::2] = -1
     # Photon noise: the variance of light grows with the light, in all channels that take part.
@@ -301,7 +303,8 @@ def _inner_rows(
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Rows well inside bright and inside dark runs (edges may be a pixel off)."""
     values = np.array([2, *(int(c) for c in code), 2])
-    trim = min(0.8, 0.3 * unit)
+    # However the rows fall, at least one per segment is left.
+    trim = min(max(0.5 * unit - 0.52, 0.0), 0.8)
 
     def at(place: Floats) -> NDArray[np.intp]:
         index = np.floor((place - top) / unit).astype(np.intp) + 1
@@ -353,7 +356,3 @@ def _sides(across: Floats, columns: Floats, peak_at: int, peak: float) -> tuple[
         at = after[0] + peak_at
         right = columns[at] - (half - across[at]) / (across[at - 1] - across[at])
     return float(left), float(right)
-
-
-def _light_of(channel: NDArray[np.uint8]) -> NDArray[np.float32]:
-    return linear(channel)

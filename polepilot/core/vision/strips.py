@@ -145,7 +145,7 @@ def _group(column: Ints, top: Ints, bottom: Ints, bits: int) -> list[Strip]:
     columns, tops, bottoms = column.tolist(), top.tolist(), bottom.tolist()
     for at in range(len(columns)):
         room = 0.5 * (bottoms[at] - tops[at]) / segments + 1.0
-        still = []
+        still: list[list[int]] = []
         for group in open_groups:
             (still if columns[at] - columns[group[-1]] <= 3 else done).append(group)
         open_groups = still
@@ -156,16 +156,14 @@ def _group(column: Ints, top: Ints, bottom: Ints, bits: int) -> list[Strip]:
                 break
         else:
             open_groups.append([at])
-    strips = []
-    for group in done + open_groups:
-        strips.append(
-            Strip(
-                bits=bits,
-                first=columns[group[0]],
-                last=columns[group[-1]],
-                top=float(np.median(top[group])) - 0.5,
-                bottom=float(np.median(bottom[group])) - 0.5,
-                columns=len({columns[at] for at in group}),
-            )
+    return [
+        Strip(
+            bits=bits,
+            first=columns[group[0]],
+            last=columns[group[-1]],
+            top=float(np.median(top[group])) - 0.5,
+            bottom=float(np.median(bottom[group])) - 0.5,
+            columns=len({columns[at] for at in group}),
         )
-    return strips
+        for group in done + open_groups
+    ]

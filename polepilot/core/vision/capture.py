@@ -62,7 +62,7 @@ class CameraCapture:
         self._period = 1 / camera.rate
         self._latency = latency
         self._clock = clock
-        self._silence = silence
+        self._silence = max(silence, 3 * self._period)
         self._backoff = backoff
 
         self._lock = threading.Lock()

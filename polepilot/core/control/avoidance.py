@@ -89,6 +89,15 @@ class ObstacleAvoidance:
         """What is remembered: centre and the radius to keep clear of, `map`."""
         return tuple(one.disc for one in self._memory.obstacles)
 
+    def reset(self) -> None:
+        """Forget all: the robot was carried away, or its pose was found anew."""
+        self._memory.forget()
+        self._detour = None
+        self._backing = 0.0
+        self._standing_since = None
+        self._last = STAND
+        self.reason = ""
+
     def blocked_for(self, now: float) -> float:
         """Seconds that it has been standing before an obstacle; 0 while it drives."""
         return 0.0 if self._standing_since is None else now - self._standing_since

@@ -21,7 +21,7 @@ TOLERANCE = 0.12
 """A reading is explained by the site if it is no shorter than expected by more than this."""
 FORGET = 10.0
 """Seconds after the last reading."""
-CONFIRM = 2
+CONFIRM = 3
 """Readings before an obstacle counts."""
 MISSES = 4
 """Free looks in a row at where it should be, after which it is gone."""
@@ -80,7 +80,7 @@ class ObstacleMemory:
 
     @property
     def obstacles(self) -> list[Remembered]:
-        """Those that were read more than once."""
+        """Those that were read often enough to count."""
         return [one for one in self._known if one.confirmed]
 
     def forget(self) -> None:
@@ -128,6 +128,7 @@ class ObstacleMemory:
     ) -> bool:
         """Whether the site has something in that direction that is near enough."""
         half = HALF_BEAM + math.radians(2) + 2 * min(heading, 0.1)
+        half += math.atan2(2 * min(position, 0.1), max(reading, 0.2))
         expected = walls.in_beam(sensor, half, self._proximity.max_range + 0.5)
         tolerance = TOLERANCE + 2 * position + 0.03 * reading
         return expected is not None and reading > expected - tolerance

@@ -11,11 +11,17 @@ import shapely
 from numpy.typing import NDArray
 
 from polepilot.core.command import DriveCommand
+from polepilot.core.control.avoidance import ObstacleAvoidance
 from polepilot.core.control.tracker import PathTracker
 from polepilot.core.geometry import Point, Pose2D
+from polepilot.core.observation import PoseEstimate, Status
 from polepilot.core.plan import Plan, PlanPart, Prediction
+from polepilot.core.scenery import Scenery
 from polepilot.core.sim.motion import Actuation, Disturbances, Motion
-from polepilot.core.vehicle import PanUnit, Vehicle
+from polepilot.core.sim.obstacle import Obstacle
+from polepilot.core.sim.proximity import sense
+from polepilot.core.site import Site
+from polepilot.core.vehicle import PanUnit, Proximity, Vehicle
 
 VEHICLE = Vehicle()
 FULL_SPEED = 0.5
@@ -105,3 +111,67 @@ def drive(
         run.progress.append(run.tracker.progress)
     motion.advance(0.5, Actuation(steering=command.steering))
     return run
+
+
+@dataclass
+class Encounter:
+    """A drive among people: what came of it. Gaps are from the body, metres."""
+
+    done: bool
+    seconds: float
+    end: Pose2D
+    to_people: float
+    to_walls: float
+    reasons: list[str]
+    positions: list[Point]
+    stood: float
+    """Seconds of standing while something was in the way."""
+
+
+def meet(
+    path: list[Point],
+    site: Site,
+    people: list[Obstacle],
+    *,
+    start: Pose2D | None = None,
+    seed: int = 1,
+    longest: float = 80.0,
+    sigma: float = 0.0,
+) -> Encounter:
+    """Drive ``path`` with avoidance, sensing walls and people with the simulated rangers."""
+    rng = np.random.default_rng(seed)
+    if start is None:
+        (x, y), (next_x, next_y) = path[0], path[1]
+        start = Pose2D(x, y, math.atan2(next_y - y, next_x - x))
+    motion = Motion(VEHICLE, PanUnit(), Disturbances(), rng, full_speed=FULL_SPEED, pose=start)
+    tracker = PathTracker(plan_of(path), VEHICLE)
+    avoidance = ObstacleAvoidance(Proximity(), VEHICLE, site)
+    walls = Scenery(site.segments())
+    poles = [(mark.position, mark.kind.diameter / 2) for mark in site.landmarks]
+    scene = walls.with_discs(poles)
+    covariance = np.diag([max(sigma, 0.01) ** 2] * 2 + [max(sigma / 2, 0.005) ** 2])
+    result = Encounter(False, 0.0, start, math.inf, math.inf, [], [], 0.0)
+    step = 0.05
+    while not tracker.done and result.seconds < longest:
+        now = result.seconds
+        discs = [(person.position(now), person.radius) for person in people]
+        sensed = sense(motion.pose, Proximity(), scene.with_discs(discs), rng)
+        left, center, right = (mm / 1000 for mm in sensed)
+        error = rng.standard_normal(3) * (sigma, sigma, sigma / 2)
+        pose = Pose2D(*(value + float(e) for value, e in zip(motion.pose, error, strict=True)))
+        estimate = PoseEstimate(now, pose, covariance, Status.TRACKING)
+        command = avoidance.update(now, step, estimate, (left, center, right), tracker)
+        if avoidance.reason and avoidance.reason not in result.reasons:
+            result.reasons.append(avoidance.reason)
+        if avoidance.active and command.speed == 0:
+            result.stood += step
+        motion.advance(step, actuation(command))
+        result.seconds += step
+        here = motion.pose.position
+        result.positions.append(here)
+        result.to_walls = min(result.to_walls, walls.distance(here) - VEHICLE.body_radius)
+        for center_of, radius in discs:
+            gap = math.dist(here, center_of) - radius - VEHICLE.body_radius
+            result.to_people = min(result.to_people, gap)
+    result.done, result.end = tracker.done, motion.pose
+    return result

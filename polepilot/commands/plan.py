@@ -11,7 +11,8 @@ import typer
 
 if TYPE_CHECKING:
     from polepilot.core.plan import Plan
-    from polepilot.core.site import Start
+    from polepilot.core.planning.options import PlanOptions
+    from polepilot.core.site import Site, Start
 
 
 class JobMode(StrEnum):
@@ -44,10 +45,8 @@ def plan(
     import json
 
     from polepilot.core.errors import InputError
-    from polepilot.core.planning.coverage import plan_scan
     from polepilot.core.planning.options import PlanOptions
     from polepilot.core.planning.plot import plot_svg
-    from polepilot.core.planning.route import plan_route
     from polepilot.core.site import read_site
 
     site = read_site(site_file)
@@ -58,15 +57,7 @@ def plan(
         start=parse_start(start) if start is not None else None,
         order=order.value,
     )
-    if mode is JobMode.ROUTE:
-        if route is None:
-            known = ", ".join(repr(entry.name) for entry in site.routes) or "none"
-            raise InputError(f"--route is missing: the site's routes are {known}.")
-        result = plan_route(site, route, options)
-    elif route is not None:
-        raise InputError("--route is given with --mode scan: expected --mode route.")
-    else:
-        result = plan_scan(site, options)
+    result = make_plan(site, mode, route, options)
     if plot is not None:
         try:
             plot.write_text(plot_svg(site, result), encoding="utf-8")
@@ -76,6 +67,27 @@ def plan(
         typer.echo(json.dumps(result.to_json(), allow_nan=False))
     else:
         typer.echo(_summary(result))
+
+
+def make_plan(site: Site, mode: JobMode, route: str | None, options: PlanOptions) -> Plan:
+    """The plan of a job.
+
+    Raises:
+        InputError: route mode without a route that exists, or scan mode with one.
+        PlanError: the job cannot be planned.
+    """
+    from polepilot.core.errors import InputError
+    from polepilot.core.planning.coverage import plan_scan
+    from polepilot.core.planning.route import plan_route
+
+    if mode is JobMode.ROUTE:
+        if route is None:
+            known = ", ".join(repr(entry.name) for entry in site.routes) or "none"
+            raise InputError(f"--route is missing: the site's routes are {known}.")
+        return plan_route(site, route, options)
+    if route is not None:
+        raise InputError("--route is given with --mode scan: expected --mode route.")
+    return plan_scan(site, options)
 
 
 def parse_start(text: str) -> Start:

@@ -16,10 +16,13 @@ import numpy as np
 from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.observation import Status
 from polepilot.core.plan import Plan
+from polepilot.core.robot.eye import Eye
 from polepilot.core.robot.mission import RunSummary
+from polepilot.core.robot.ports import SensorPort
 from polepilot.core.robot.recorder import Recorder
 from polepilot.core.robot.robot import Robot, RobotSettings
 from polepilot.core.robot.snapshot import Snapshot, State
+from polepilot.core.sim.motion import Disturbances
 from polepilot.core.sim.world import World
 from polepilot.core.site import Site
 from polepilot.core.trajectory import (
@@ -29,6 +32,7 @@ from polepilot.core.trajectory import (
     position_errors,
     write_tum,
 )
+from polepilot.core.vision.detector import LandmarkDetector
 
 TICK = 0.02
 """Seconds between two steps of the robot."""
@@ -134,16 +138,22 @@ class Simulation:
         seed: int,
         rendered: bool,
         log: Path,
+        disturbances: Disturbances | None = None,
     ) -> Simulation:
-        """A fresh world with the robot at the start of its plan."""
+        """A fresh world with the robot at the start of its plan; ``disturbances`` None draws one
+        robot of a series from the seed."""
         world = World(
             site,
             settings.model,
             seed=seed,
-            sensing="rendered" if rendered else "measured",
             start=_start_pose(site, plan),
+            disturbances=disturbances,
         )
-        robot = Robot(settings, world.sensor, world.link)
+        lens = settings.model.camera
+        sensor: SensorPort = world.sensor
+        if rendered:
+            sensor = Eye(world.camera, lambda kinds: LandmarkDetector(lens, kinds))
+        robot = Robot(settings, sensor, world.link)
         recorder = Recorder(log, witness=lambda: world.truth)
         return cls(site, plan, world, robot, recorder)
 

@@ -8,7 +8,7 @@ from typing import Any, Literal
 from shapely import MultiPolygon
 from shapely.geometry import mapping
 
-from polepilot.core.command import STAND, DriveCommand
+from polepilot.core.command import DriveCommand
 from polepilot.core.control.avoidance import ObstacleAvoidance
 from polepilot.core.control.tracker import PathTracker
 from polepilot.core.geometry import Point, Pose2D
@@ -108,10 +108,12 @@ class Mission:
         proximity: tuple[float | None, float | None, float | None],
     ) -> Step:
         """The command that follows the plan from ``estimate``, round obstacles."""
-        wanted = self._tracker.update(estimate.pose, dt)
-        if self.done:
-            return Step(STAND, self.target)
-        return self._go_round(now, estimate, proximity, wanted)
+        command = self._avoidance.update(now, dt, estimate, proximity, self._tracker)
+        return Step(command, self._avoidance.target or self._tracker.target, self._avoidance.reason)
+
+    def forget_obstacles(self) -> None:
+        """The pose was found anew: what was remembered about obstacles hangs on the old one."""
+        self._avoidance.reset()
 
     def observe(self, pose: Pose2D) -> None:
         """Add where the robot is now to what it has swept and travelled."""

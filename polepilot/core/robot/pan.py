@@ -29,9 +29,7 @@ class BoardClock:
         board = board_ms / 1000
         offset = received - board
         if (
-            self._offset is None
-            or board < self._last
-            or abs(offset - self._offset) > 1.0
+            self._offset is None or board < self._last or abs(offset - self._offset) > 1.0
         ):  # first packet, wrap around, or a board that was reset
             self._offset = offset
         else:

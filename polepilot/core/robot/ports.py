@@ -13,6 +13,8 @@ from polepilot.core.landmark import LandmarkKind
 from polepilot.core.link.report import Chunk
 from polepilot.core.observation import Detection, Frame
 
+__all__ = ["CameraPort", "Chunk", "Clock", "LinkPort", "SensorPort", "Sighting"]
+
 
 @dataclass(frozen=True, slots=True)
 class Sighting:

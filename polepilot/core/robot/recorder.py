@@ -95,9 +95,7 @@ class Recorder:
             },
         )
 
-    def sighting(
-        self, stamp: float, measurements: list[RangeBearing], frame: Frame | None
-    ) -> None:
+    def sighting(self, stamp: float, measurements: list[RangeBearing], frame: Frame | None) -> None:
         """What one picture gave, and now and then the picture itself."""
         if measurements:
             self._put(
@@ -161,7 +159,7 @@ class Recorder:
                         schema = writer.register_schema(name, "jsonschema", b'{"type":"object"}')
                         channels[name] = writer.register_channel(name, "json", schema)
                     writer.add_message(channels[name], nanoseconds, data, nanoseconds)
-                writer.finish()
+                writer.finish()  # type: ignore[no-untyped-call]
         except OSError as error:
             self.error = error
 

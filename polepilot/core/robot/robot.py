@@ -158,9 +158,7 @@ class Robot:
         """
         site = self._startable(plan)
         self._host.arm()
-        self._mission = Mission(
-            run_id, plan, site, self.settings.model, recorder, self._now
-        )
+        self._mission = Mission(run_id, plan, site, self.settings.model, recorder, self._now)
         self._paused = None
         recorder.begin(self._now, site, plan)
         what = "Scanning the area" if plan.mode == "scan" else "Tracking the route"
@@ -306,6 +304,8 @@ class Robot:
             localizer.refix(localizer.reason)
         self._estimate = localizer.estimate(now)
         for event in localizer.events():
+            if event.code == "refixed" and self._mission is not None:
+                self._mission.forget_obstacles()
             self._say(event.code, _LEVELS.get(event.code, "info"), event.text)
 
     def _use(self, sighting: Sighting, angle: float, localizer: Localizer) -> None:
@@ -340,7 +340,9 @@ class Robot:
             self._finish("done", "The whole path was driven.")
             return STAND
         if mission.off_route:
-            self.pause("Stopped: too far from the path. End the run, then plan from here.")
+            self.pause(
+                f"Stopped: {mission.off_route_reason}. End the run, then plan again from here."
+            )
             return STAND
         return step.command
 

@@ -8,15 +8,16 @@ from __future__ import annotations
 import math
 import threading
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from polepilot.core.errors import CameraError, InternalError, LinkError
 from polepilot.core.geometry import Point, Pose2D
+from polepilot.core.landmark import LandmarkKind
 from polepilot.core.observation import Frame
-from polepilot.core.robot.ports import Sighting
+from polepilot.core.robot.ports import Chunk, Sighting
 from polepilot.core.scenery import Disc, Scenery
 from polepilot.core.sim.board import Board, BoardInputs, BoardSettings
 from polepilot.core.sim.motion import Actuation, Disturbances, Motion
@@ -36,6 +37,7 @@ CONTACT_PERIOD = 0.020
 COUNTS_PER_METRE = 2000.0
 """Of the wheel encoders, for boards whose settings say that they have some."""
 _REACH = 3.0
+_MOST_CHUNKS = 200
 _BATTERY_FULL_MV = 12_400
 _BATTERY_MV_PER_HOUR = 300
 
@@ -264,16 +266,26 @@ class WorldLink:
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self._waiting = bytearray()
-        self.plugged = True
-        """False: somebody has pulled the cable."""
+        self._waiting: deque[Chunk] = deque(maxlen=_MOST_CHUNKS)
+        self._plugged = True
+        self.generation = 1
 
-    def read(self) -> bytes:
+    @property
+    def plugged(self) -> bool:
+        """False: somebody has pulled the cable."""
+        return self._plugged
+
+    @plugged.setter
+    def plugged(self, plugged: bool) -> None:
+        self.generation += plugged and not self._plugged
+        self._plugged = plugged
+
+    def read(self) -> list[Chunk]:
         self._check()
         with self._world._lock:
-            data = bytes(self._waiting)
+            chunks = list(self._waiting)
             self._waiting.clear()
-        return data
+        return chunks
 
     def write(self, data: bytes) -> None:
         self._check()
@@ -284,12 +296,11 @@ class WorldLink:
         """Nothing to give back."""
 
     def deliver(self, data: bytes) -> None:
-        if self.plugged:
-            self._waiting += data
-            del self._waiting[:-8192]
+        if self._plugged and data:
+            self._waiting.append(Chunk(self._world.now, data))
 
     def _check(self) -> None:
-        if not self.plugged:
+        if not self._plugged:
             raise LinkError("the simulated USB cable is unplugged.", remedy="Plug it in.")
 
 
@@ -341,6 +352,9 @@ class WorldCamera(_Pictures):
 
 class WorldSensor(_Pictures):
     """A `SensorPort`: sightings from the detector's error model, without pictures."""
+
+    def expect(self, kinds: Mapping[int, LandmarkKind]) -> None:
+        """The model sees what is there, whatever the robot expects."""
 
     def read(self) -> Sighting | None:
         world = self._world

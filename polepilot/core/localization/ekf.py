@@ -1,9 +1,10 @@
 """Extended Kalman filter on the pose and on what distorts odometry and measurements.
 
-Ten states: x, y, heading; the relative error of the speed; the steering's offset; the relative
-error of ranges; and four Legendre coefficients of the potentiometer's error over the pan range.
-The last seven change slowly or never; estimating them is what brings the error from decimetres
-to centimetres (the paper's one-landmark correction never corrects the heading).
+Eleven states: x, y, heading; the relative error of the speed; the steering's offset; the error of
+the servo's time constant; the relative error of ranges; and four Legendre coefficients of the
+potentiometer's error over the pan range. The last eight change slowly or never; estimating them
+is what brings the error from decimetres to centimetres (the paper's one-landmark correction never
+corrects the heading).
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ Array = NDArray[np.float64]
 _WIDE = (0.3, 0.3, math.radians(8.0))
 """Standard deviations before the sightings of a fix are taken in, metres and radians."""
 
-STATES = 10
-SPEED, STEERING, RANGE, PAN = 3, 4, 5, 6
+STATES = 11
+SPEED, STEERING, LAG, RANGE, PAN = 3, 4, 5, 6, 7
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +45,8 @@ class NoiseModel:
     steering_prior: float = math.radians(1.5)
     steering_walk: float = math.radians(0.02)
     steering_noise: float = math.radians(0.3)
-    servo_doubt: float = 0.2
+    lag_prior: float = 0.06
+    servo_doubt: float = 0.1
     """Error of the modelled wheel angle while the servo is on its way, as a share of that way."""
     skid: float = 0.004
     """Unmodelled motion in any direction, metres per square root of a metre driven."""
@@ -75,11 +77,11 @@ class Innovation(NamedTuple):
     squared: float
     """Squared Mahalanobis distance."""
     jacobian: Array
-    """2 x 10."""
+    """2 x 11."""
     spread: Array
     """2 x 2 covariance of the innovation, inverted."""
     cross: Array
-    """10 x 2, P Hᵀ."""
+    """11 x 2, P Hᵀ."""
 
     @property
     def metres(self) -> float:
@@ -101,7 +103,13 @@ class PoseFilter:
 
     def __post_init__(self) -> None:
         noise = self.noise
-        priors = (noise.speed_prior, noise.steering_prior, noise.range_prior, *noise.pan_priors)
+        priors = (
+            noise.speed_prior,
+            noise.steering_prior,
+            noise.lag_prior,
+            noise.range_prior,
+            *noise.pan_priors,
+        )
         self.covariance[3:, 3:] = np.diag(np.square(priors))
 
     def reset(self, pose: Pose2D, covariance: Array) -> None:
@@ -110,6 +118,15 @@ class PoseFilter:
         self.covariance[:3, :3] = covariance
         self.covariance[:3, 3:] = 0.0
         self.covariance[3:, :3] = 0.0
+
+    def retuned(self, shift: float) -> None:
+        """The history's time constant of the servo was raised by ``shift`` seconds."""
+        self.state[LAG] -= shift
+
+    @property
+    def lag_error(self) -> float:
+        """True time constant of the servo minus the history's, seconds."""
+        return float(self.state[LAG])
 
     def begin(
         self,
@@ -169,20 +186,24 @@ class PoseFilter:
         pose, jacobian = advance_with_jacobians(
             Pose2D(state[0], state[1], state[2]),
             step.speed * (1.0 + state[SPEED]),
-            step.steering + state[STEERING],
+            step.steering + state[STEERING] + step.by_lag * state[LAG],
             dt,
             self.wheelbase,
         )
         state[:3] = pose
+        hurried = jacobian[:, 3] * step.unsettled_speed
         jacobian[:, 3] *= step.speed
         speed_variance = noise.speed_noise**2 / dt
         steering_variance = noise.steering_noise**2 / dt + (noise.servo_doubt * step.unsettled) ** 2
         p = self.covariance
-        moved = jacobian @ p[:5]
-        block = moved[:, :5] @ jacobian.T
+        jacobian = np.column_stack((jacobian, jacobian[:, STEERING] * step.by_lag))
+        moved = jacobian @ p[:6]
+        block = moved[:, :6] @ jacobian.T
         by_speed, by_steering = jacobian[:, 3], jacobian[:, 4]
         block += np.outer(by_speed, by_speed) * speed_variance
         block += np.outer(by_steering, by_steering) * steering_variance
+        if step.unsettled_speed:
+            block += np.outer(hurried, hurried)
         skid = noise.skid**2 * abs(step.speed) * dt
         block[0, 0] += skid
         block[1, 1] += skid

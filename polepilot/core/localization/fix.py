@@ -359,7 +359,7 @@ def _finish(
         except np.linalg.LinAlgError:
             return _one_direction(ids)
         state = state + step
-        if float(np.abs(step).max()) < 1e-7:
+        if float(np.abs(step).max()) < 1e-6:
             break
     if worst > 1.0:
         return FixRefusal(

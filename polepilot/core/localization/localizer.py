@@ -30,6 +30,10 @@ from polepilot.core.vehicle import Vehicle
 
 Method = Literal["ekf", "paper"]
 
+_LAG_STEP = 0.01
+"""The servo's time constant is followed in steps of this, seconds, and within these limits."""
+_SHORTEST_LAG, _LONGEST_LAG = 0.02, 0.5
+
 
 @dataclass(frozen=True, slots=True)
 class LocalizerSettings:
@@ -299,8 +303,20 @@ class Localizer:
         if taken:
             track.moving = 0.0
             self._against = []
+            self._retune()
         self._judge_contradictions(stamp)
         self._judge(stamp, track.moving, _largest_sigma(track.filter.pose_covariance))
+
+    def _retune(self) -> None:
+        """Let the history follow what the filter has learnt of the servo."""
+        tracked = self._filter
+        if not isinstance(tracked, PoseFilter) or abs(tracked.lag_error) < _LAG_STEP:
+            return
+        before = self._history.steering_lag
+        after = min(max(before + tracked.lag_error, _SHORTEST_LAG), _LONGEST_LAG)
+        if abs(after - before) > 0.5 * _LAG_STEP:
+            self._history.retune(after)
+            tracked.retuned(after - before)
 
     def _take(self, track: _Track, measurement: RangeBearing) -> bool:
         """Whether a measurement was fused; keeps the books on those that were not."""

@@ -74,6 +74,10 @@ class Step(NamedTuple):
     steering: float
     unsettled: float
     """How far the servo still was from the angle it was told, rad: a measure of doubt."""
+    by_lag: float = 0.0
+    """Derivative of ``steering`` by the servo's time constant, rad/s."""
+    unsettled_speed: float = 0.0
+    """How far the motors still were from the speed they were told, m/s."""
 
 
 class _Entry(NamedTuple):
@@ -83,6 +87,14 @@ class _Entry(NamedTuple):
     speed_then: float
     """What the motors did at ``stamp``, while on the way to ``speed``."""
     steering_then: float
+    lagged_then: float
+    """``steering_then`` through the servo's lag once more: what tells the effect of the lag."""
+
+
+class _Values(NamedTuple):
+    speed: float
+    steering: float
+    lagged: float
 
 
 class OdometryHistory:
@@ -125,21 +137,34 @@ class OdometryHistory:
         if not (math.isfinite(stamp) and math.isfinite(speed) and math.isfinite(steering)):
             return
         if not self._entries:
-            self._push(_Entry(stamp, speed, steering, speed, steering))
+            self._push(_Entry(stamp, speed, steering, speed, steering, steering))
             return
         last = self._entries[-1]
         if stamp < last.stamp:
             return
-        speed_then, steering_then = self._values(last, stamp)
+        then = self._values(last, stamp)
         if stamp == last.stamp:
             self._entries.pop()
             self._stamps.pop()
-        self._push(_Entry(stamp, speed, steering, speed_then, steering_then))
+        self._push(_Entry(stamp, speed, steering, *then))
         if self._stamps[0] < stamp - 2.0 * self._span:
             # The one entry that was valid when the span begins stays.
             keep = max(0, bisect_right(self._stamps, stamp - self._span) - 1)
             del self._entries[:keep]
             del self._stamps[:keep]
+
+    @property
+    def steering_lag(self) -> float:
+        """Time constant of the servo, seconds."""
+        return self._steering_lag
+
+    def retune(self, steering_lag: float) -> None:
+        """Another time constant of the servo, for the whole span."""
+        self._steering_lag = steering_lag
+        for index in range(1, len(self._entries)):
+            entry = self._entries[index]
+            then = self._values(self._entries[index - 1], entry.stamp)
+            self._entries[index] = _Entry(entry.stamp, entry.speed, entry.steering, *then)
 
     def steps(self, start: float, end: float) -> Iterator[Step]:
         """The motion from ``start`` to ``end`` in steps of at most ``longest_step`` seconds."""
@@ -191,20 +216,27 @@ class OdometryHistory:
         if dt <= 0:
             return
         for index in range(count):
-            speed, steering = self._values(entry, start + (index + 0.5) * dt)
+            speed, steering, lagged = self._values(entry, start + (index + 0.5) * dt)
             if abs(speed) < 1e-4:
                 speed = 0.0
-            yield Step(dt, speed, steering, abs(entry.steering - steering))
+            by_lag = (lagged - steering) / self._steering_lag if self._steering_lag > 0 else 0.0
+            rush = abs(entry.speed - speed) if speed else 0.0
+            yield Step(dt, speed, steering, abs(entry.steering - steering), by_lag, rush)
 
-    def _values(self, entry: _Entry, stamp: float) -> tuple[float, float]:
-        """Speed and steering that motors and servo had reached at ``stamp``."""
+    def _values(self, entry: _Entry, stamp: float) -> _Values:
+        """What motors and servo had reached at ``stamp``."""
         age = stamp - entry.stamp
         speed, steering = entry.speed, entry.steering
         if self._speed_lag > 0 and speed != entry.speed_then:
             speed += (entry.speed_then - speed) * math.exp(-age / self._speed_lag)
-        if self._steering_lag > 0 and steering != entry.steering_then:
-            steering += (entry.steering_then - steering) * math.exp(-age / self._steering_lag)
-        return speed, steering
+        if self._steering_lag == 0:
+            return _Values(speed, steering, steering)
+        share = age / self._steering_lag
+        left = math.exp(-share)
+        missing, lagging = entry.steering_then - steering, entry.lagged_then - steering
+        return _Values(
+            speed, steering + missing * left, steering + (lagging + missing * share) * left
+        )
 
 
 def _sinc(turn: float) -> float:

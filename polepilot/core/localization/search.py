@@ -19,7 +19,7 @@ from polepilot.core.localization.fix import Fix, FixRefusal, FixSettings, fix
 from polepilot.core.localization.odometry import OdometryHistory
 from polepilot.core.observation import RangeBearing
 
-_PER_LANDMARK = 8
+_PER_LANDMARK = 6
 """Sightings of one landmark that take part in a fix, the newest."""
 _NOTHING = FixRefusal("No landmark of the map has been seen.", "none")
 _LONGEST_WAY = 1.5

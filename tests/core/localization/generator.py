@@ -28,6 +28,7 @@ class Faults:
     speed_scale: float = 1.03
     steering_offset: float = math.radians(1.0)
     servo_lag: float = 0.12
+    motor_lag: float = 0.05
     slip: float = 0.02
     slip_bursts: float = 0.0
     pan_bend: float = 0.003
@@ -60,6 +61,7 @@ def record(
     standing: float = 7.0,
     stands: tuple[float, float] | None = None,
     speed: float = 0.3,
+    stop_and_go: bool = False,
 ) -> Recording:
     """Stand for a while, then drive round ``loop`` with the camera sweeping all the time."""
     rng = np.random.default_rng(seed)
@@ -74,7 +76,7 @@ def record(
         real[i] = (mark.x + dx + mx, mark.y + dy + my)
     start = math.atan2(loop[1][1] - loop[0][1], loop[1][0] - loop[0][0])
     x, y, heading = loop[0][0], loop[0][1], start + float(rng.normal(0, 0.2))
-    target, steering, told, slip = 1, 0.0, (0.0, 0.0), 0.0
+    target, steering, driven, told, slip = 1, 0.0, 0.0, (0.0, 0.0), 0.0
     burst_until, burst = -1.0, 0.0
     pan, pan_way = float(rng.uniform(-2, 2)), math.radians(45) * (1 if rng.random() < 0.5 else -1)
     events: list[Odometry | tuple[float, list[RangeBearing]]] = [Odometry(0.0, 0.0, 0.0)]
@@ -83,6 +85,7 @@ def record(
     for tick in range(1, int(seconds / STEP)):
         t = round(tick * STEP, 6)
         standing_now = t < standing or (stands is not None and stands[0] <= t < stands[1])
+        standing_now = standing_now or (stop_and_go and t % 4.0 < 1.5)
         if faults.lift_at is not None and abs(t - faults.lift_at) < 0.5 * STEP:
             x, y = x + faults.lift_by[0], y + faults.lift_by[1]
             heading += faults.lift_by[2]
@@ -103,7 +106,8 @@ def record(
         if faults.slip_bursts and t > burst_until and rng.random() < STEP / 6:
             burst_until, burst = t + 1.0, faults.slip_bursts
         factor = faults.speed_scale * (1 - slip) * (1 - (burst if t < burst_until else 0.0))
-        v = told[0] * factor
+        driven += (told[0] - driven) * (1 - math.exp(-STEP / max(faults.motor_lag, 1e-9)))
+        v = driven * factor
         turn = v * math.tan(steering + faults.steering_offset) / WHEELBASE * STEP
         turn *= 1 + 0.5 * slip
         x += v * STEP * math.cos(heading + turn / 2)

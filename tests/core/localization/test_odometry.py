@@ -146,6 +146,23 @@ def test_history_models_the_servo() -> None:
     assert steps[100].steering == pytest.approx(0.2 * (1 - math.exp(-1.005)), abs=1e-4)
 
 
+def test_the_effect_of_the_servos_lag_matches_differences() -> None:
+    def steering(lag: float) -> list[float]:
+        history = OdometryHistory(0.2, steering_lag=lag)
+        for index, angle in enumerate([0.0, 0.3, -0.2, 0.1, 0.4]):
+            history.add(Odometry(0.15 * index, 0.5, angle))
+        return [step.steering for step in history.steps(0.0, 0.9)]
+
+    history = OdometryHistory(0.2, steering_lag=0.3)
+    for index, angle in enumerate([0.0, 0.3, -0.2, 0.1, 0.4]):
+        history.add(Odometry(0.15 * index, 0.5, angle))
+    history.retune(0.1)
+    steps = list(history.steps(0.0, 0.9))
+    assert [step.steering for step in steps] == pytest.approx(steering(0.1))
+    numeric = (np.array(steering(0.1 + 1e-5)) - steering(0.1 - 1e-5)) / 2e-5
+    assert [step.by_lag for step in steps] == pytest.approx(numeric, abs=1e-4)
+
+
 def test_history_is_bounded_and_ignores_nonsense() -> None:
     history = OdometryHistory(0.2, span=2.0)
     for index in range(20_000):

@@ -341,9 +341,10 @@ class Panel:
             batched_wxyzs=np.tile([1.0, 0, 0, 0], (len(poles.positions), 1)),
             batched_positions=poles.positions,
             batched_scales=poles.scales,
-            batched_colors=np.where(poles.bright[:, None], text.LANDMARK, text.DARK).astype(
-                np.uint8
-            ),
+            # viser 1.x takes the colours of batched meshes as linear light, all others as sRGB.
+            batched_colors=np.where(
+                poles.bright[:, None], text.linear(text.LANDMARK), text.linear(text.DARK)
+            ).astype(np.uint8),
             lod="off",
             flat_shading=True,
             cast_shadow=False,

@@ -31,6 +31,15 @@ _STALE = 1.0
 """Seconds after which a value shows its age."""
 
 
+def linear(color: RGB) -> RGB:
+    """An sRGB colour as linear light, 0 to 255 (IEC 61966-2-1)."""
+    red, green, blue = (
+        round(255 * (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4))
+        for c in (part / 255 for part in color)
+    )
+    return red, green, blue
+
+
 def length(metres: float | None) -> str:
     """Centimetres under 10 m, else metres with one decimal; a dash where it is unknown."""
     if metres is None:

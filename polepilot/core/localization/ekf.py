@@ -1,10 +1,10 @@
 """Extended Kalman filter on the pose and on what distorts odometry and measurements.
 
-Eleven states: x, y, heading; the relative error of the speed; the steering's offset; the error of
-the servo's time constant; the relative error of ranges; and four Legendre coefficients of the
-potentiometer's error over the pan range. The last eight change slowly or never; estimating them
-is what brings the error from decimetres to centimetres (the paper's one-landmark correction never
-corrects the heading).
+Twelve states: x, y, heading; the relative error of the speed; the steering's offset; the errors of
+the servo's and the motors' time constants; the relative error of ranges; and four Legendre
+coefficients of the potentiometer's error over the pan range. The last nine change slowly or never;
+estimating them is what brings the error from decimetres to centimetres (the paper's one-landmark
+correction never corrects the heading).
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ Array = NDArray[np.float64]
 _WIDE = (0.3, 0.3, math.radians(8.0))
 """Standard deviations before the sightings of a fix are taken in, metres and radians."""
 
-STATES = 11
-SPEED, STEERING, LAG, RANGE, PAN = 3, 4, 5, 6, 7
+STATES = 12
+SPEED, STEERING, SERVO_LAG, MOTOR_LAG, RANGE, PAN = 3, 4, 5, 6, 7, 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +45,12 @@ class NoiseModel:
     steering_prior: float = math.radians(1.5)
     steering_walk: float = math.radians(0.02)
     steering_noise: float = math.radians(0.3)
-    lag_prior: float = 0.06
+    servo_lag_prior: float = 0.06
+    motor_lag_prior: float = 0.05
     servo_doubt: float = 0.1
     """Error of the modelled wheel angle while the servo is on its way, as a share of that way."""
+    motor_doubt: float = 0.2
+    """The same for the motors on their way to another speed."""
     skid: float = 0.004
     """Unmodelled motion in any direction, metres per square root of a metre driven."""
     range_prior: float = 0.005
@@ -77,11 +80,11 @@ class Innovation(NamedTuple):
     squared: float
     """Squared Mahalanobis distance."""
     jacobian: Array
-    """2 x 11."""
+    """2 x 12."""
     spread: Array
     """2 x 2 covariance of the innovation, inverted."""
     cross: Array
-    """11 x 2, P Hᵀ."""
+    """12 x 2, P Hᵀ."""
 
     @property
     def metres(self) -> float:
@@ -106,7 +109,8 @@ class PoseFilter:
         priors = (
             noise.speed_prior,
             noise.steering_prior,
-            noise.lag_prior,
+            noise.servo_lag_prior,
+            noise.motor_lag_prior,
             noise.range_prior,
             *noise.pan_priors,
         )
@@ -119,14 +123,15 @@ class PoseFilter:
         self.covariance[:3, 3:] = 0.0
         self.covariance[3:, :3] = 0.0
 
-    def retuned(self, shift: float) -> None:
-        """The history's time constant of the servo was raised by ``shift`` seconds."""
-        self.state[LAG] -= shift
+    def retuned(self, motor: float, servo: float) -> None:
+        """The history's time constants were raised by so many seconds."""
+        self.state[MOTOR_LAG] -= motor
+        self.state[SERVO_LAG] -= servo
 
     @property
-    def lag_error(self) -> float:
-        """True time constant of the servo minus the history's, seconds."""
-        return float(self.state[LAG])
+    def lag_errors(self) -> tuple[float, float]:
+        """True time constants of motors and servo minus the history's, seconds."""
+        return float(self.state[MOTOR_LAG]), float(self.state[SERVO_LAG])
 
     def begin(
         self,
@@ -183,22 +188,31 @@ class PoseFilter:
         if step.speed == 0.0:
             return
         state, noise, dt = self.state, self.noise, step.dt
+        speed = step.speed + step.speed_by_lag * float(state[MOTOR_LAG])
+        factor = 1.0 + float(state[SPEED])
         pose, jacobian = advance_with_jacobians(
             Pose2D(state[0], state[1], state[2]),
-            step.speed * (1.0 + state[SPEED]),
-            step.steering + state[STEERING] + step.by_lag * state[LAG],
+            speed * factor,
+            step.steering + state[STEERING] + step.by_lag * state[SERVO_LAG],
             dt,
             self.wheelbase,
         )
         state[:3] = pose
-        hurried = jacobian[:, 3] * step.unsettled_speed
-        jacobian[:, 3] *= step.speed
+        raw = jacobian[:, 3]
+        hurried = raw * (noise.motor_doubt * step.unsettled_speed)
+        jacobian = np.column_stack(
+            (
+                jacobian,
+                jacobian[:, 4] * step.by_lag,
+                raw * (factor * step.speed_by_lag),
+            )
+        )
+        jacobian[:, 3] *= speed
         speed_variance = noise.speed_noise**2 / dt
         steering_variance = noise.steering_noise**2 / dt + (noise.servo_doubt * step.unsettled) ** 2
         p = self.covariance
-        jacobian = np.column_stack((jacobian, jacobian[:, STEERING] * step.by_lag))
-        moved = jacobian @ p[:6]
-        block = moved[:, :6] @ jacobian.T
+        moved = jacobian @ p[:7]
+        block = moved[:, :7] @ jacobian.T
         by_speed, by_steering = jacobian[:, 3], jacobian[:, 4]
         block += np.outer(by_speed, by_speed) * speed_variance
         block += np.outer(by_steering, by_steering) * steering_variance

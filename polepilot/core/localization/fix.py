@@ -103,9 +103,10 @@ def circle_intersections(
         raise InputError("two landmarks stand in the same place: their circles have no answer.")
     if not (0 <= radius_a < math.inf and 0 <= radius_b < math.inf):
         raise InputError(f"ranges are {radius_a} and {radius_b} m: expected finite, not negative.")
-    gap = max(distance - radius_a - radius_b, abs(radius_a - radius_b) - distance, 0.0)
+    apart, inside = distance - radius_a - radius_b, abs(radius_a - radius_b) - distance
+    gap = max(apart, inside, 0.0)
     if gap > 0:
-        if distance > radius_a + radius_b:
+        if apart >= inside:
             along = 0.5 * (radius_a + distance - radius_b)
         elif radius_a > radius_b:
             along = 0.5 * (radius_a + distance + radius_b)

@@ -31,8 +31,8 @@ from polepilot.core.vehicle import Vehicle
 Method = Literal["ekf", "paper"]
 
 _LAG_STEP = 0.01
-"""The servo's time constant is followed in steps of this, seconds, and within these limits."""
-_SHORTEST_LAG, _LONGEST_LAG = 0.02, 0.5
+"""The time constants are followed in steps of this, seconds, and within these limits."""
+_SHORTEST_LAG, _LONGEST_LAG = 0.01, 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +50,9 @@ class LocalizerSettings:
     lost_after: float = 12.0
     lost_sigma: float = 0.25
     steering_lag: float = 0.10
-    """Time constant of the steering servo, seconds."""
-    speed_lag: float = 0.0
-    """Time constant of the motors, seconds."""
+    """Time constant of the steering servo, seconds; the EKF learns the true one."""
+    speed_lag: float = 0.04
+    """Time constant of the motors, likewise."""
     fix: FixSettings = field(default_factory=FixSettings)
     noise: NoiseModel = field(default_factory=NoiseModel)
 
@@ -308,15 +308,18 @@ class Localizer:
         self._judge(stamp, track.moving, _largest_sigma(track.filter.pose_covariance))
 
     def _retune(self) -> None:
-        """Let the history follow what the filter has learnt of the servo."""
-        tracked = self._filter
-        if not isinstance(tracked, PoseFilter) or abs(tracked.lag_error) < _LAG_STEP:
+        """Let the history follow what the filter has learnt of servo and motors."""
+        tracked, history = self._filter, self._history
+        if not isinstance(tracked, PoseFilter) or max(map(abs, tracked.lag_errors)) < _LAG_STEP:
             return
-        before = self._history.steering_lag
-        after = min(max(before + tracked.lag_error, _SHORTEST_LAG), _LONGEST_LAG)
-        if abs(after - before) > 0.5 * _LAG_STEP:
-            self._history.retune(after)
-            tracked.retuned(after - before)
+        before = (history.speed_lag, history.steering_lag)
+        motor, servo = (
+            min(max(lag + error, _SHORTEST_LAG), _LONGEST_LAG)
+            for lag, error in zip(before, tracked.lag_errors, strict=True)
+        )
+        if max(abs(motor - before[0]), abs(servo - before[1])) > 0.5 * _LAG_STEP:
+            history.retune(motor, servo)
+            tracked.retuned(motor - before[0], servo - before[1])
 
     def _take(self, track: _Track, measurement: RangeBearing) -> bool:
         """Whether a measurement was fused; keeps the books on those that were not."""

@@ -78,6 +78,8 @@ class Step(NamedTuple):
     """Derivative of ``steering`` by the servo's time constant, rad/s."""
     unsettled_speed: float = 0.0
     """How far the motors still were from the speed they were told, m/s."""
+    speed_by_lag: float = 0.0
+    """Derivative of ``speed`` by the motors' time constant, m/s²."""
 
 
 class _Entry(NamedTuple):
@@ -87,14 +89,16 @@ class _Entry(NamedTuple):
     speed_then: float
     """What the motors did at ``stamp``, while on the way to ``speed``."""
     steering_then: float
-    lagged_then: float
-    """``steering_then`` through the servo's lag once more: what tells the effect of the lag."""
+    lagged_speed_then: float
+    lagged_steering_then: float
+    """Both through their lag once more: what tells the effect of the lag."""
 
 
 class _Values(NamedTuple):
     speed: float
     steering: float
-    lagged: float
+    lagged_speed: float
+    lagged_steering: float
 
 
 class OdometryHistory:
@@ -137,7 +141,7 @@ class OdometryHistory:
         if not (math.isfinite(stamp) and math.isfinite(speed) and math.isfinite(steering)):
             return
         if not self._entries:
-            self._push(_Entry(stamp, speed, steering, speed, steering, steering))
+            self._push(_Entry(stamp, speed, steering, speed, steering, speed, steering))
             return
         last = self._entries[-1]
         if stamp < last.stamp:
@@ -154,13 +158,18 @@ class OdometryHistory:
             del self._stamps[:keep]
 
     @property
+    def speed_lag(self) -> float:
+        """Time constant of the motors, seconds."""
+        return self._speed_lag
+
+    @property
     def steering_lag(self) -> float:
         """Time constant of the servo, seconds."""
         return self._steering_lag
 
-    def retune(self, steering_lag: float) -> None:
-        """Another time constant of the servo, for the whole span."""
-        self._steering_lag = steering_lag
+    def retune(self, speed_lag: float, steering_lag: float) -> None:
+        """Other time constants, for the whole span."""
+        self._speed_lag, self._steering_lag = speed_lag, steering_lag
         for index in range(1, len(self._entries)):
             entry = self._entries[index]
             then = self._values(self._entries[index - 1], entry.stamp)
@@ -216,27 +225,45 @@ class OdometryHistory:
         if dt <= 0:
             return
         for index in range(count):
-            speed, steering, lagged = self._values(entry, start + (index + 0.5) * dt)
-            if abs(speed) < 1e-4:
-                speed = 0.0
-            by_lag = (lagged - steering) / self._steering_lag if self._steering_lag > 0 else 0.0
-            rush = abs(entry.speed - speed) if speed else 0.0
-            yield Step(dt, speed, steering, abs(entry.steering - steering), by_lag, rush)
+            now = self._values(entry, start + (index + 0.5) * dt)
+            if abs(now.speed) < 1e-4:
+                yield Step(dt, 0.0, now.steering, 0.0)
+                continue
+            yield Step(
+                dt,
+                now.speed,
+                now.steering,
+                abs(entry.steering - now.steering),
+                _slope(now.lagged_steering - now.steering, self._steering_lag),
+                abs(entry.speed - now.speed),
+                _slope(now.lagged_speed - now.speed, self._speed_lag),
+            )
 
     def _values(self, entry: _Entry, stamp: float) -> _Values:
         """What motors and servo had reached at ``stamp``."""
         age = stamp - entry.stamp
-        speed, steering = entry.speed, entry.steering
-        if self._speed_lag > 0 and speed != entry.speed_then:
-            speed += (entry.speed_then - speed) * math.exp(-age / self._speed_lag)
-        if self._steering_lag == 0:
-            return _Values(speed, steering, steering)
-        share = age / self._steering_lag
-        left = math.exp(-share)
-        missing, lagging = entry.steering_then - steering, entry.lagged_then - steering
-        return _Values(
-            speed, steering + missing * left, steering + (lagging + missing * share) * left
+        speed, lagged_speed = _follow(
+            entry.speed, entry.speed_then, entry.lagged_speed_then, age, self._speed_lag
         )
+        steering, lagged_steering = _follow(
+            entry.steering, entry.steering_then, entry.lagged_steering_then, age, self._steering_lag
+        )
+        return _Values(speed, steering, lagged_speed, lagged_steering)
+
+
+def _follow(
+    told: float, value: float, lagged: float, age: float, lag: float
+) -> tuple[float, float]:
+    """A first-order lag after ``age`` seconds, and the same through the lag once more."""
+    if lag == 0 or (value == told and lagged == told):
+        return told, told
+    share = age / lag
+    left = math.exp(-share)
+    return told + (value - told) * left, told + (lagged - told + (value - told) * share) * left
+
+
+def _slope(difference: float, lag: float) -> float:
+    return difference / lag if lag > 0 else 0.0
 
 
 def _sinc(turn: float) -> float:

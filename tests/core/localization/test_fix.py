@@ -77,6 +77,12 @@ def test_both_intersections_lie_on_both_circles(
         assert math.dist(point, b) == pytest.approx(rb, abs=1e-4)
 
 
+def test_circles_that_miss_by_a_rounding_error_touch_where_they_should() -> None:
+    both = circle_intersections((-1 / 3, 1 / 3), (1.0, 1 / 3), 1 / 3, 1.0)
+    assert both.gap < 1e-12
+    assert math.dist(both.first, (0.0, 1 / 3)) < 1e-6
+
+
 @pytest.mark.parametrize(
     ("ra", "rb", "gap", "x"),
     [(1.0, 2.0, 1.0, 1.5), (6.0, 1.0, 1.0, 5.5), (1.0, 6.0, 1.0, -1.5)],

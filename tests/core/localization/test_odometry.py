@@ -146,21 +146,26 @@ def test_history_models_the_servo() -> None:
     assert steps[100].steering == pytest.approx(0.2 * (1 - math.exp(-1.005)), abs=1e-4)
 
 
-def test_the_effect_of_the_servos_lag_matches_differences() -> None:
-    def steering(lag: float) -> list[float]:
-        history = OdometryHistory(0.2, steering_lag=lag)
-        for index, angle in enumerate([0.0, 0.3, -0.2, 0.1, 0.4]):
-            history.add(Odometry(0.15 * index, 0.5, angle))
-        return [step.steering for step in history.steps(0.0, 0.9)]
+COMMANDS = [(0.0, 0.0), (0.5, 0.3), (0.2, -0.2), (0.6, 0.1), (0.4, 0.4)]
 
-    history = OdometryHistory(0.2, steering_lag=0.3)
-    for index, angle in enumerate([0.0, 0.3, -0.2, 0.1, 0.4]):
-        history.add(Odometry(0.15 * index, 0.5, angle))
-    history.retune(0.1)
-    steps = list(history.steps(0.0, 0.9))
-    assert [step.steering for step in steps] == pytest.approx(steering(0.1))
-    numeric = (np.array(steering(0.1 + 1e-5)) - steering(0.1 - 1e-5)) / 2e-5
-    assert [step.by_lag for step in steps] == pytest.approx(numeric, abs=1e-4)
+
+def lagging(lag: float) -> OdometryHistory:
+    history = OdometryHistory(0.2, steering_lag=lag, speed_lag=2 * lag)
+    for index, (speed, angle) in enumerate(COMMANDS):
+        history.add(Odometry(0.15 * index, speed, angle))
+    return history
+
+
+def test_the_effect_of_the_lags_matches_differences() -> None:
+    history = lagging(0.3)
+    history.retune(0.2, 0.1)
+    steps = list(history.steps(0.15, 0.9))
+    same, low, high = (list(lagging(x).steps(0.15, 0.9)) for x in (0.1, 0.1 - 1e-5, 0.1 + 1e-5))
+    assert [s.steering for s in steps] == pytest.approx([s.steering for s in same])
+    assert [s.speed for s in steps] == pytest.approx([s.speed for s in same])
+    for step, a, b in zip(steps, low, high, strict=True):
+        assert step.by_lag == pytest.approx((b.steering - a.steering) / 2e-5, abs=1e-4)
+        assert step.speed_by_lag == pytest.approx((b.speed - a.speed) / 4e-5, abs=1e-4)
 
 
 def test_history_is_bounded_and_ignores_nonsense() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from html import escape
 
+from polepilot.core.observation import PoseEstimate
 from polepilot.core.robot.snapshot import Snapshot, State
 
 RGB = tuple[int, int, int]
@@ -73,7 +74,7 @@ def card(snapshot: Snapshot) -> str:
         rows += [
             ("Place", f"{length(pose.x)}, {length(pose.y)}{aged}"),
             ("Heading", f"{degrees(pose.heading)}{aged}"),
-            ("Known to", f"{length(estimate.position_sigma)}, {degrees(estimate.heading_sigma)}"),
+            ("Known to", _spread(estimate)),
         ]
     rows.append(("Speed", f"{snapshot.command.speed * 100:.0f} cm/s"))
     rows.append(("Camera", degrees(snapshot.pan)))
@@ -121,6 +122,12 @@ def legend(*, simulated: bool) -> str:
         if simulated or color != INK
     )
     return f"<div style='padding:4px 12px 8px;font-size:13px;line-height:1.5'>{rows}</div>"
+
+
+def _spread(estimate: PoseEstimate) -> str:
+    """Standard deviations, finer than the values themselves: a good pose is not known to 0 cm."""
+    heading = math.degrees(estimate.heading_sigma)
+    return f"± {estimate.position_sigma * 100:.1f} cm, {heading:.1f}°"
 
 
 def _hex(color: RGB) -> str:

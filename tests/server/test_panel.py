@@ -176,8 +176,10 @@ def test_lengths_are_written_for_people(metres: float | None, shown: str) -> Non
 
 def test_card_says_what_is_known() -> None:
     card = text.card(snapshot(0))
-    for words in ("Running", "100 cm, 300 cm", "20 cm/s", "29°", "landmark 13", "31%", "1:15 min"):
+    for words in ("Running", "100 cm, 300 cm", "20 cm/s", "29°", "31%", "1:15 min"):
         assert words in card
+    assert "landmark 13" in card
+    assert "± 2.0 cm, 1.8°" in card
     assert "Covered" not in text.card(snapshot(0, mission=None))
 
 

@@ -150,14 +150,17 @@ def _plausible(scale: Scale) -> bool:
 
 
 def _best(found: list[tuple[float, Detection]]) -> list[Detection]:
-    """One detection per place: where strips overlap, the one that fits best."""
+    """One detection per id and place: of rivals, the one that fits best."""
     kept: list[Detection] = []
     for _, one in sorted(found, key=lambda pair: pair[0]):
         reach = 0.12 * (one.bottom - one.top)
         if all(
-            abs(one.column - other.column) > reach
-            or one.bottom < other.top
-            or other.bottom < one.top
+            one.id != other.id
+            and (
+                abs(one.column - other.column) > reach
+                or one.bottom < other.top
+                or other.bottom < one.top
+            )
             for other in kept
         ):
             kept.append(one)

@@ -26,6 +26,9 @@ _MARGIN = 1.2
 """Segments above and below the code that take part in the fit."""
 _STEEPEST = 0.2
 """Columns per row: twice what 60 degrees/s of pan and 2 degrees of roll amount to."""
+_UPRIGHT = 0.25
+"""Pixels from top to bottom by which a strip may lean and count as upright."""
+_UPRIGHT_ROUNDS = 4
 _ROUNDS = 6
 _NONLINEAR = 4
 """Top, unit, blur, growth."""
@@ -114,15 +117,17 @@ def straighten(image: Image, strip: Strip, code: str, aspect: float) -> Column |
         return None
     columns = np.arange(column0, column1, dtype=np.float64)
     middle = (strip.top + strip.bottom) / 2
-    slope = _lean(light, rows, columns, bright, dark, middle, centre, wide)
-    if abs(slope) > _STEEPEST:
-        return None
-    if abs(slope) * (strip.bottom - strip.top) > 0.3:
-        matrix = np.array([[1.0, slope, -slope * (middle - row0)], [0.0, 1.0, 0.0]])
-        size = (patch.shape[1], patch.shape[0])
-        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        upright = cv2.warpAffine(patch, matrix, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
-        patch = np.asarray(upright, np.uint8)
+    # The dark rows of a leaning strip show the background smeared into it, which hides a part of
+    # the lean: what is left shows once the strip is nearly upright.
+    leaning, slope = patch, 0.0
+    for _ in range(_UPRIGHT_ROUNDS):
+        more = _lean(light, rows, columns, bright, dark, middle, centre, wide)
+        if abs(more) * (strip.bottom - strip.top) <= _UPRIGHT:
+            break
+        slope += more
+        if abs(slope) > _STEEPEST:
+            return None
+        patch = _upright(leaning, slope, middle - row0)
         light = linear(patch)
     across = light[bright].mean(axis=0) - light[dark].mean(axis=0)
     across = across.astype(np.float64)
@@ -313,6 +318,15 @@ def _inner_rows(
 
     before, after = at(rows - trim), at(rows + trim)
     return (before == 1) & (after == 1), (before == 0) & (after == 0)
+
+
+def _upright(patch: Image, slope: float, middle: float) -> Image:
+    """Move every row back to the left by ``slope`` * (row - ``middle``)."""
+    matrix = np.array([[1.0, slope, -slope * middle], [0.0, 1.0, 0.0]])
+    size = (patch.shape[1], patch.shape[0])
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    moved = cv2.warpAffine(patch, matrix, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(moved, np.uint8)
 
 
 def _lean(

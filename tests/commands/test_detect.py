@@ -1,0 +1,157 @@
+"""The `detect` and `bench vision` contracts of the command line."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from pathlib import Path
+
+import cv2
+import pytest
+from vision_scenes import picture, pole
+
+from polepilot.commands.detect import parse_center, parse_ids
+from polepilot.commands.main import run
+from polepilot.core.errors import InputError
+from polepilot.core.landmark import LandmarkKind
+
+KEYS = {"id", "range", "bearing", "column", "top", "bottom", "range_sigma", "bearing_sigma"}
+
+
+@pytest.fixture
+def near(tmp_path: Path) -> str:
+    path = tmp_path / "near.png"
+    cv2.imwrite(str(path), picture([pole(13, 3.0, 0.1)]))
+    return str(path)
+
+
+@pytest.fixture
+def empty(tmp_path: Path) -> str:
+    path = tmp_path / "empty.jpg"
+    cv2.imwrite(str(path), picture([]))
+    return str(path)
+
+
+def test_json_is_one_document(near: str, empty: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["detect", near, empty, near, "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    frames = json.loads(out)["frames"]
+    assert [frame["file"] for frame in frames] == [near, empty, near]
+    assert frames[0]["detections"] == frames[2]["detections"]
+    assert frames[1]["detections"] == []
+    (found,) = frames[0]["detections"]
+    assert set(found) == KEYS
+    assert found["id"] == 13
+    assert found["range"] == pytest.approx(3.0, rel=0.005)
+    assert found["bearing"] == pytest.approx(0.1, abs=0.002)
+    assert 0 < found["range_sigma"] < 0.05
+    assert 0 < found["bearing_sigma"] < 0.01
+
+
+def test_options_change_the_answer(near: str, capsys: pytest.CaptureFixture[str]) -> None:
+    def ask(*options: str) -> list[dict[str, float]]:
+        assert run(["detect", near, "--json", *options]) == 0
+        found: list[dict[str, float]] = json.loads(capsys.readouterr().out)["frames"][0][
+            "detections"
+        ]
+        return found
+
+    (plain,) = ask()
+    (double,) = ask("--camera-constant", "1200", "--shape", "flat")
+    assert double["range"] == pytest.approx(2 * plain["range"], rel=0.03)
+    (moved,) = ask("--center", "159.5,149.5")
+    assert moved["bearing"] < plain["bearing"] - math.radians(3)
+    assert ask("--ids", "1-12,14") == []
+    assert ask("--bits", "8") == []
+    (bigger,) = ask("--segment", "0.1", "--diameter", "0.14")
+    assert bigger["range"] == pytest.approx(2 * plain["range"], rel=0.03)
+    (paper,) = ask("--detector", "paper")
+    assert paper["id"] == 13
+
+
+def test_eight_bits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "eight.png"
+    cv2.imwrite(str(path), picture([pole(201, 4.0, 0.0, LandmarkKind(bits=8))]))
+    assert run(["detect", str(path), "--bits", "8", "--ids", "1-255", "--json"]) == 0
+    (found,) = json.loads(capsys.readouterr().out)["frames"][0]["detections"]
+    assert found["id"] == 201
+
+
+def test_a_table_for_people(near: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["detect", near]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"\b13\b.*\b(29[89]|30[012])\.\d\b.*\+5\.7\d", out)
+
+
+def test_every_unreadable_file_is_named(
+    near: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = tmp_path / "text.png"
+    text.write_text("hello")
+    missing = tmp_path / "missing.png"
+    cut = tmp_path / "cut.png"
+    cut.write_bytes(Path(near).read_bytes()[:5000])
+    assert run(["detect", near, str(text), str(missing), str(cut), "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert str(near) not in err
+    for path in (text, missing, cut):
+        assert str(path) in err
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--center", "1"],
+        ["--center", "a,b"],
+        ["--center", "nan,1"],
+        ["--ids", "0-3"],
+        ["--ids", "7-3"],
+        ["--ids", "16"],
+        ["--ids", "x"],
+        ["--ids", ""],
+        ["--bits", "7"],
+        ["--camera-constant", "0"],
+        ["--camera-constant", "nan"],
+        ["--segment", "-1"],
+        ["--shape", "ball"],
+        ["--detector", "best"],
+        ["--no-such-option"],
+    ],
+)
+def test_bad_options(near: str, options: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["detect", near, *options]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert options[0].lstrip("-").split("-")[0] in err
+
+
+def test_lists_of_ids_and_centres() -> None:
+    assert parse_ids("1-15", 4) == list(range(1, 16))
+    assert parse_ids("1, 3,7-9,3", 4) == [1, 3, 7, 8, 9]
+    assert parse_center("199.5, -3") == (199.5, -3.0)
+    with pytest.raises(InputError, match="CX,CY"):
+        parse_center("1,2,3")
+
+
+def test_annotate(near: str, tmp_path: Path) -> None:
+    out = tmp_path / "seen.png"
+    assert run(["detect", near, "--annotate", str(out)]) == 0
+    drawn = cv2.imread(str(out))
+    assert drawn is not None
+    assert ((drawn[:, :, 1] > 200) & (drawn[:, :, 0] < 120) & (drawn[:, :, 2] < 120)).any()
+
+
+def test_bench_vision(near: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["bench", "vision", "--frames", str(Path(near).parent), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["frames"] == 1
+    assert result["source"] == str(Path(near).parent)
+    assert result["ratio"] == pytest.approx(result["ours_ms"] / result["aruco_ms"])
+    (tmp_path / "none").mkdir()
+    assert run(["bench", "vision", "--frames", str(tmp_path / "none")]) == 2
+    assert "no picture" in capsys.readouterr().err

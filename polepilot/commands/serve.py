@@ -59,6 +59,7 @@ def _with_board(settings: Settings, board: str | None) -> Settings:
 
 def _run(settings: Settings, host: str, port: int, sockets: list, data: Path | None) -> None:  # type: ignore[type-arg]
     import asyncio
+    import sys
 
     from polepilot.server.app import create_app
     from polepilot.server.assembly import open_services
@@ -69,8 +70,11 @@ def _run(settings: Settings, host: str, port: int, sockets: list, data: Path | N
     services = open_services(settings, host, port, data)
     shown = f"[{host}]" if ":" in host else host
 
+    # Fixed now: a library that starts in the background swallows what is printed meanwhile.
+    output = sys.stdout
+
     def ready() -> None:
-        typer.echo(f"Polepilot is ready: http://{shown}:{port}/")
+        typer.echo(f"Polepilot is ready: http://{shown}:{port}/", file=output)
 
     asyncio.run(Listener(create_app(services), services, ready).serve(sockets))
     if services.failed:

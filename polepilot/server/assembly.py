@@ -10,13 +10,11 @@ import numpy as np
 import platformdirs
 import shapely
 
-from polepilot.core.control.supervisor import Limits
 from polepilot.core.geometry import Pose2D
 from polepilot.core.link.usb import SerialPort
-from polepilot.core.localization.localizer import LocalizerSettings
 from polepilot.core.robot.eye import Eye
 from polepilot.core.robot.ports import CameraPort, Clock
-from polepilot.core.robot.robot import Robot, RobotSettings
+from polepilot.core.robot.robot import Robot
 from polepilot.core.sim.clock import PacedClock
 from polepilot.core.sim.obstacle import Obstacle
 from polepilot.core.sim.world import World, start_of
@@ -74,16 +72,8 @@ class WorldTwin:
 
 def assemble(settings: Settings, site: Site) -> Assembly:
     """Build what ``settings`` describe. ``site`` is where a simulated robot stands at first."""
-    robot_settings = RobotSettings(
-        model=settings.model,
-        calibration=settings.calibration,
-        localizer=LocalizerSettings(
-            method=settings.localizer.method, tolerance=settings.localizer.tolerance_m
-        ),
-        limits=Limits(),
-    )
     if settings.link.board == "simulated":
-        return _simulated(settings, robot_settings, site)
+        return _simulated(settings, site)
     clock = MonotonicClock()
     address = settings.port_address
     assert address is not None
@@ -94,12 +84,12 @@ def assemble(settings: Settings, site: Site) -> Assembly:
         latency=settings.camera.latency_s,
         clock=clock.now,
     )
-    link = SerialPort(address, settings.link.baud, clock.now)
+    link = SerialPort(address, settings.link.baud_rate, clock.now)
     sensor = BackgroundSensor(_eye(camera, settings.model.camera))
-    return Assembly(Robot(robot_settings, sensor, link), clock, None)
+    return Assembly(Robot(settings.robot, sensor, link), clock, None)
 
 
-def _simulated(settings: Settings, robot_settings: RobotSettings, site: Site) -> Assembly:
+def _simulated(settings: Settings, site: Site) -> Assembly:
     seed = settings.simulation.seed
     world = World(
         site,
@@ -109,7 +99,7 @@ def _simulated(settings: Settings, robot_settings: RobotSettings, site: Site) ->
     )
     rendered = settings.simulation.sensing == "rendered"
     sensor = BackgroundSensor(_eye(world.camera, settings.model.camera)) if rendered else None
-    robot = Robot(robot_settings, world.sensor if sensor is None else sensor, world.link)
+    robot = Robot(settings.robot, world.sensor if sensor is None else sensor, world.link)
     return Assembly(robot, PacedClock(world), WorldTwin(world))
 
 

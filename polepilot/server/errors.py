@@ -39,7 +39,6 @@ _STATUS: tuple[tuple[type[PolepilotError], int], ...] = (
     (DeviceError, 503),
 )
 _CODES = {
-    400: "bad_request",
     403: "forbidden",
     404: "not_found",
     405: "method_not_allowed",
@@ -136,6 +135,9 @@ async def _on_validation_error(_: Request, error: Exception) -> JSONResponse:
 
 async def _on_http_error(_: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, HTTPException)
+    if error.status_code == 400:
+        # FastAPI's word for a body that is not even text.
+        return problem(422, "the body is not JSON.", code="bad_json")
     code = _CODES.get(error.status_code, "http_error")
     return problem(error.status_code, str(error.detail), code=code, headers=error.headers)
 

@@ -37,6 +37,12 @@ class _WebSocketProtocol(WebSocketsSansIOProtocol):
         await super().run_asgi()
         self.loop.call_later(_LAST_WORDS, self.transport.abort)
 
+    async def send(self, message: Any) -> None:
+        await super().send(message)
+        if message["type"] == "websocket.http.response.body":
+            # A refusal is a complete handshake too, and nothing to complain about in the log.
+            self.handshake_complete = True
+
 
 class Listener(uvicorn.Server):
     """Serves one application until a signal, or until the robot has given up."""

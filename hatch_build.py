@@ -131,8 +131,10 @@ def run(node: Path, web: Path, arguments: list[str], name: str) -> None:
         check=False,
     )
     if done.returncode != 0:
-        words = (done.stderr.strip() or done.stdout.strip())[-2000:]
-        raise PageError(f"the page cannot be built: {name} failed.\n{words}")
+        words = (done.stderr.strip() or done.stdout.strip()).splitlines()
+        # npm says the cause first and then prints its manual.
+        told = [line for line in words if line.strip() and not line.startswith("npm warn")][:20]
+        raise PageError("\n".join([f"the page cannot be built: {name} failed.", *told]))
 
 
 def say(text: str) -> None:

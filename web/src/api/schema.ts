@@ -601,6 +601,11 @@ export interface components {
                 [key: string]: unknown;
             }[];
             /**
+             * Name
+             * @default
+             */
+            name: string;
+            /**
              * Type
              * @constant
              */

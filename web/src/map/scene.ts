@@ -117,11 +117,15 @@ function paintNow(paper: Paper, whole: boolean): void {
     robot.paintObstacles(paper, now.obstacles);
     if (now.target && now.mission) robot.paintTarget(paper, now.target);
   }
+  paper.ctx.save();
+  // While somebody draws, the robot only says where it is.
+  if (!whole) paper.ctx.globalAlpha = 0.5;
   if (now.pose) {
     const at: Point = [now.pose.x, now.pose.y];
     if (whole) robot.paintEllipse(paper, at, now.pose.covariance);
     robot.paintRobot(paper, at, now.pose.heading, about);
   }
+  paper.ctx.restore();
   if (now.real && whole) {
     robot.paintReal(
       paper,

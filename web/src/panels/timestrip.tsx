@@ -72,12 +72,16 @@ function Progress() {
   );
 }
 
+const noMouse = window.matchMedia("(hover: none)");
+
 function drawingLine(tool: Sketch | null): string {
   const problems = check.value?.problems.length ?? 0;
   if (tool) return hint(tool);
   if (problems > 0)
     return `${problems === 1 ? "One thing has" : `${problems} things have`} to be mended before the site can be driven.`;
-  return "Click a thing to select it, drag its corners. Hold Alt to place freely.";
+  return noMouse.matches
+    ? "Tap a thing to select it, then drag its corners."
+    : "Click a thing to select it, drag its corners. Hold Alt to place freely.";
 }
 
 /** What belongs to the place at the moment. */

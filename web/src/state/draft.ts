@@ -12,6 +12,7 @@ import * as history from "../core/history";
 import { asSite, emptySite, exists, removed, type Selection, type Site } from "../core/site";
 import { formatSelection, go, location, parseSelection } from "./location";
 import { doing, say, sentenceOf } from "./notice";
+import { readRobotSite } from "./robot";
 import { refreshSites } from "./sites";
 import { stored, storeText } from "./storage";
 
@@ -128,6 +129,7 @@ function settle(record: SiteRecord, sent: Site): void {
     go({ id: record.id }, true);
   say(record.repairs.length > 0 ? `Saved. ${record.repairs.join(" ")}` : "Saved.");
   void refreshSites();
+  void readRobotSite();
 }
 
 /** Saves; true where the server has it now. */

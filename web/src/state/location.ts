@@ -1,4 +1,4 @@
-/** Place and selection, as they stand in the address: #/draw/3/wall-1. Back and forward work. */
+/** Place and selection, as they stand in the address: /draw/3/wall-1. Back and forward work. */
 
 import { signal } from "@preact/signals";
 import { KINDS, type Kind, type Selection } from "../core/site";
@@ -22,8 +22,8 @@ export interface Location {
   detail: string | null;
 }
 
-export function parse(hash: string): Location {
-  const [place, id, detail] = hash.replace(/^#?\/?/, "").split("/");
+export function parse(path: string): Location {
+  const [place, id, detail] = path.replace(/^\//, "").split("/");
   return {
     place: PLACES.find((name) => name === place) ?? "draw",
     id: /^\d+$/.test(id ?? "") ? Number(id) : null,
@@ -33,7 +33,7 @@ export function parse(hash: string): Location {
 
 export function format({ place, id, detail }: Location): string {
   const tail = detail === null ? "" : `/${detail}`;
-  return `#/${place}${id === null ? (detail === null ? "" : "/new") : `/${id}`}${tail}`;
+  return `/${place}${id === null ? (detail === null ? "" : "/new") : `/${id}`}${tail}`;
 }
 
 export function parseSelection(detail: string | null): Selection | null {
@@ -47,7 +47,7 @@ export function parseSelection(detail: string | null): Selection | null {
 export const formatSelection = (at: Selection): string =>
   [at.kind, at.index, ...(at.vertex === undefined ? [] : [at.vertex])].join("-");
 
-export const location = signal<Location>(parse(window.location.hash));
+export const location = signal<Location>(parse(window.location.pathname));
 
 /** Goes somewhere. `replace` keeps the way back free of steps nobody wants to go back to. */
 export function go(to: Partial<Location> & { place?: Place }, replace = false): void {
@@ -56,14 +56,13 @@ export function go(to: Partial<Location> & { place?: Place }, replace = false): 
     next.id = to.id ?? null;
     next.detail = to.detail ?? null;
   }
-  const hash = format(next);
+  const path = format(next);
   location.value = next;
-  if (hash === window.location.hash) return;
-  window.history[replace ? "replaceState" : "pushState"](null, "", hash);
+  if (path === window.location.pathname) return;
+  window.history[replace ? "replaceState" : "pushState"](null, "", path);
 }
 
 const follow = () => {
-  location.value = parse(window.location.hash);
+  location.value = parse(window.location.pathname);
 };
 window.addEventListener("popstate", follow);
-window.addEventListener("hashchange", follow);

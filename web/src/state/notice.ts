@@ -1,7 +1,8 @@
 /** The one line that says what happened and what to do. */
 
-import { signal } from "@preact/signals";
+import { effect, signal } from "@preact/signals";
 import { ApiError } from "../api/client";
+import { location } from "./location";
 
 export interface Notice {
   text: string;
@@ -45,3 +46,11 @@ export async function doing<T>(what: string, action: () => Promise<T>): Promise<
     if (work.value === what) work.value = null;
   }
 }
+
+// News of one place is no news in the next; a fault stays until it is read.
+let place = location.value.place;
+effect(() => {
+  if (location.value.place === place) return;
+  place = location.value.place;
+  if (notice.peek()?.level === "info") notice.value = null;
+});

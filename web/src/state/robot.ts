@@ -72,6 +72,8 @@ async function seed(runId: number, planId: number): Promise<void> {
   ]);
   if (missionId.value !== runId) return;
   missionPlan.value = plan;
+  // The robot keeps the version that it began with, whatever is saved meanwhile.
+  if (plan) void readRobotSite();
   const driven = (track?.estimated ?? []).flatMap((row): Point[] =>
     row ? [[row[0], row[1]]] : [],
   );
@@ -90,17 +92,20 @@ const robotSiteId = computed(() => snapshot.value?.site_id ?? about.value?.site_
 /** Reads anew what the robot works on; after a save it may be another version. */
 export async function readRobotSite(): Promise<void> {
   const id = robotSiteId.peek();
-  robotSite.value =
-    id === null
-      ? null
-      : await api
-          .readSite(id)
-          .then((r) => asSite(r.site))
-          .catch(() => null);
+  const plan = missionId.peek() === null ? null : missionPlan.peek();
+  const record =
+    plan && plan.site_id === id
+      ? api.readSiteVersion(plan.site_id, plan.site_version)
+      : id === null
+        ? null
+        : api.readSite(id);
+  const site = await Promise.resolve(record).catch(() => null);
+  robotSite.value = site && asSite(site.site);
 }
 
 effect(() => {
   void robotSiteId.value;
+  void missionId.value;
   untracked(() => void readRobotSite());
 });
 

@@ -3,7 +3,7 @@
 const PATHS = {
   select: "M5 3l14 8-6 1.5L10 19z",
   boundary: "M4 6l7-3 9 4-1 12-13 2z",
-  island: "M7 8h10v8H7z M9 8l-2 2 M13 8l-6 6 M17 8l-8 8 M17 12l-4 4",
+  island: "M4 6h16v12H4z M10 6l-6 6 M16 6L4 18 M20 8L10 18 M20 14l-4 4",
   wall: "M4 20L20 4",
   landmark: "M9 2h6v20H9z M9 6h6 M9 10h6 M9 14h6 M9 18h6",
   route: "M5 19h8a3 3 0 000-6H9a3 3 0 010-6h10 M16 4l3 3-3 3",

@@ -56,8 +56,8 @@ class FixSettings:
     """Of a landmark's mapped position, per axis, metres."""
     bearing_floor: float = math.radians(0.25)
     """Added to every bearing's error: potentiometer, camera mounting. Radians."""
-    max_position_sigma: float = 0.10
-    max_heading_sigma: float = math.radians(3.0)
+    max_position_sigma: float = 0.06
+    max_heading_sigma: float = math.radians(2.0)
     gate: float = 4.0
     """How many sigmas a measurement may be off before it is an outlier."""
     slack: float = 0.05

@@ -63,11 +63,18 @@ class LandmarkHealth:
         if scatter > _SCATTER or math.hypot(dx, dy) < _SHIFT:
             return None
         self._places.pop(number)
-        others = (other for other in self.landmarks.values() if other.id != number)
-        if any(math.dist(middle, other.position) < _FAMILY for other in others):
+        if self.stands_another(number, (float(middle[0]), float(middle[1]))):
             return Verdict(number, "landmark_misread", dx, dy)
         self.moved[number] = (dx, dy)
         return Verdict(number, "landmark_moved", dx, dy)
+
+    def stands_another(self, number: int, place: Point) -> bool:
+        """Whether the map has another landmark than ``number`` at ``place``."""
+        return any(
+            math.dist(place, other.position) < _FAMILY
+            for other in self.landmarks.values()
+            if other.id != number
+        )
 
     def agreed(self, number: int) -> bool:
         """``number`` was seen where the map has it; True if that brings it back into use."""

@@ -195,8 +195,10 @@ class Localizer:
         self._measured = self._predicted = None
         self._status, self._reason = Status.FIXING, reason
         self._search.clear()
-        for measurement in self._against:
-            self._search.add(measurement)
+        if len(self._landmarks) - len(self._health.moved) < 2:
+            # With so few left, it is as likely that the pose was wrong.
+            self._health.moved.clear()
+        self._collect(self._against)
         newest = self._against[-1].stamp if self._against else None
         self._against = []
         self._last_agreed.clear()
@@ -221,8 +223,7 @@ class Localizer:
         for stamp, group in groupby(usable, key=lambda m: m.stamp):
             picture = list(group)
             if self._track is None:
-                for measurement in picture:
-                    self._search.add(measurement)
+                self._collect(picture)
                 self._try_fix(stamp)
             elif stamp < self._track.stamp - 1e-9:
                 for measurement in picture:
@@ -259,6 +260,12 @@ class Localizer:
         text = f"Landmark {measurement.landmark} is seen but is not on the map."
         self._report(measurement.stamp, "landmark_unknown", text, measurement.landmark)
         return False
+
+    def _collect(self, measurements: Sequence[RangeBearing]) -> None:
+        """Keep for a fix; landmarks known to have been moved would only mislead it."""
+        for measurement in measurements:
+            if measurement.landmark not in self._health.moved:
+                self._search.add(measurement)
 
     def _try_fix(self, stamp: float) -> None:
         search = self._search
@@ -343,7 +350,9 @@ class Localizer:
         offset = (None, None) if place is None else (place[0] - mark.x, place[1] - mark.y)
         text = f"Landmark {number} appears {100 * gap:.0f} cm from where it should be."
         self._report(stamp, "rejected", text, number, offset)
-        if gap > settings.tolerance:
+        # A number read where another landmark stands speaks against the reading, not the pose.
+        misread = place is not None and self._health.stands_another(number, place)
+        if gap > settings.tolerance and not misread:
             self._against.append(measurement)
             self._gap = gap
             del self._against[:-200]

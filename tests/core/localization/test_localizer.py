@@ -262,6 +262,18 @@ def test_a_rejected_landmark_is_forgiven_when_another_agrees() -> None:
     assert localizer.status is Status.TRACKING
 
 
+def test_a_landmark_misread_for_a_while_does_not_lose_the_pose() -> None:
+    localizer = standing()
+    localizer.add_measurements([sight(0.5, 3)])
+    for index in range(40):
+        wrong = sight(1.0 + 0.1 * index, 2)
+        localizer.add_measurements(
+            [RangeBearing(wrong.stamp, 3, wrong.range, wrong.bearing, 0.01, 0.001)]
+        )
+    assert localizer.status is Status.TRACKING
+    assert "landmark_misread" in [event.code for event in localizer.events()]
+
+
 def test_driving_blind_degrades_and_then_loses() -> None:
     localizer = standing()
     localizer.add_odometry(Odometry(1.0, 0.1, 0.0))

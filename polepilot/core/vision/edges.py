@@ -30,10 +30,14 @@ _UPRIGHT = 0.25
 """Pixels from top to bottom by which a strip may lean and count as upright."""
 _UPRIGHT_ROUNDS = 4
 _ROUNDS = 6
+_LINEAR = 6
+"""Light above, bright (level and gain along the code), dark (level and gain), light below."""
 _NONLINEAR = 4
 """Top, unit, blur, growth."""
 _GROWTH = 0.15
 """How much bright segments may seem to grow (glare, grey levels averaged), pixels."""
+_SETTLED = 0.02
+"""Pixels by which boundaries still move when a fit may end."""
 _RIDGE = 1e-9
 
 
@@ -179,50 +183,53 @@ def fit_scale(column: Column, code: str, top: float, unit: float) -> Scale | Non
     sign[1::2] = -1
     # Photon noise: the variance of light grows with the light, in all channels that take part.
     trust = 1 / np.sqrt(np.abs(column.channels[:, [0, -1]]).sum(axis=1) + 0.02)
-    prior = np.zeros(_NONLINEAR)
     guess = np.array([top, unit, 0.5, 0.0])
-    start = guess.copy()
+    limit = np.array([0.6 * unit, 0.08 * unit, 0.25, 0.3])
+    jacobian = np.zeros((len(rows) + 1, _LINEAR + _NONLINEAR))
+    wanted = np.zeros(len(rows) + 1)
+    level: Floats | None = None
     for _ in range(_ROUNDS):
-        basis, slopes, spreads = _model(rows, guess, edges, sign, segments)
-        level = _solve(basis * trust[:, None], light * trust)
+        basis, slopes, spreads, shift = _model(rows, guess, edges, sign, segments)
         if level is None:
-            return None
+            level = _solve(basis * trust[:, None], light * trust)
+            if level is None:
+                return None
         above, bright, gain, dark, tilt, below = level
-        shift = 2 * (rows - guess[0]) / (guess[1] * segments) - 1
-        step = (bright - dark) + (gain - tilt) * shift
-        jump = sign * step[:, None]
+        jump = sign * ((bright - dark) + (gain - tilt) * shift)[:, None]
         jump[:, 0] = bright + gain * shift - above
         jump[:, -1] = below - bright - gain * shift
         move = -jump * slopes
-        jacobian = np.column_stack(
-            [basis, move.sum(axis=1), move @ edges, (jump * spreads).sum(axis=1), -move @ sign]
-        )
-        jacobian *= trust[:, None]
+        jacobian[:-1, :_LINEAR] = basis
+        jacobian[:-1, -4] = move.sum(axis=1)
+        jacobian[:-1, -3] = move @ edges
+        jacobian[:-1, -2] = (jump * spreads).sum(axis=1)
+        jacobian[:-1, -1] = -(move @ sign)
+        jacobian[:-1] *= trust[:, None]
         rest = (light - basis @ level) * trust
+        wanted[:-1] = rest
         # A weak prior holds the growth of bright segments near nought where a code cannot tell.
-        prior[-1] = np.sqrt((rest @ rest) / max(len(rows) - 10, 1)) / _GROWTH
-        pull = np.zeros((1, jacobian.shape[1]))
-        pull[0, -1] = prior[-1]
-        jacobian = np.vstack([jacobian, pull])
-        change = _solve(jacobian, np.append(rest, -prior[-1] * guess[3]))
+        pull = math.sqrt(float(rest @ rest) / max(len(rows) - _LINEAR - _NONLINEAR, 1)) / _GROWTH
+        jacobian[-1, -1] = pull
+        wanted[-1] = -pull * guess[3]
+        change = _solve(jacobian, wanted)
         if change is None:
             return None
-        delta = change[-_NONLINEAR:]
-        limit = np.array([0.6 * start[1], 0.08 * start[1], 0.25, 0.3])
-        delta = np.clip(delta, -limit, limit)
+        level = level + change[:_LINEAR]
+        delta = np.minimum(np.maximum(change[_LINEAR:], -limit), limit)
         guess = guess + delta
         guess[2] = min(max(guess[2], 0.2), 0.25 * guess[1] + 1.2)
         if abs(guess[0] - top) > unit + 1 or abs(guess[1] / unit - 1) > 0.2:
             return None
-        if abs(delta[0]) < 1e-3 and abs(delta[1]) < 1e-4:
+        # The step after this one would be the square of it, about.
+        if abs(delta[0]) < _SETTLED and abs(delta[1]) * segments < _SETTLED:
             break
     contrast = bright - dark
     if contrast <= 0:
         return None
-    free = max(len(rows) - jacobian.shape[1], 1)
+    free = max(len(rows) - _LINEAR - _NONLINEAR, 1)
     variance = float(rest @ rest) / free
     normal = jacobian.T @ jacobian
-    normal[np.diag_indices_from(normal)] *= 1 + _RIDGE
+    normal.flat[:: len(normal) + 1] *= 1 + _RIDGE
     spread = np.linalg.inv(normal)[-3, -3] * variance
     return Scale(
         top=float(guess[0]),
@@ -238,46 +245,43 @@ def fit_scale(column: Column, code: str, top: float, unit: float) -> Scale | Non
 def segment_levels(column: Column, scale: Scale, segments: int) -> Floats | None:
     """Light of every segment with its neighbours' blur taken out: segments x channels."""
     edges = scale.top + scale.unit * np.arange(segments + 1)
-    steps, _, _ = _step(column.rows[:, None] - edges, scale.blur)
+    steps, _, _ = _step(column.rows, edges, scale.blur)
     basis = np.column_stack([1 - steps[:, 0], steps[:, :-1] - steps[:, 1:], steps[:, -1]])
     normal = basis.T @ basis
-    normal[np.diag_indices_from(normal)] += 1e-3
+    normal.flat[:: len(normal) + 1] += 1e-3
     levels: Floats = np.linalg.solve(normal, basis.T @ column.channels)
     return levels[1:-1]
 
 
 def _model(
     rows: Floats, guess: Floats, edges: Floats, sign: Floats, segments: int
-) -> tuple[Floats, Floats, Floats]:
-    """What levels are multiplied by (rows x 6), and how steps change with place and blur."""
-    steps, slopes, spreads = _step(rows[:, None] - _boundaries(guess, edges, sign), guess[2])
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """What levels are multiplied by (rows x 6), how steps change with place and blur, and how
+    far up or down the code each row lies (-1 to 1)."""
+    # Bright segments have grown by guess[3] at either end.
+    places = guess[0] + guess[1] * edges - guess[3] * sign
+    steps, slopes, spreads = _step(rows, places, float(guess[2]))
     bright = steps @ sign
     inside = steps[:, 0] - steps[:, -1]
     dark = inside - bright
     shift = 2 * (rows - guess[0]) / (guess[1] * segments) - 1
-    basis = np.column_stack(
-        [1 - steps[:, 0], bright, bright * shift, dark, dark * shift, steps[:, -1]]
+    basis = np.stack(
+        [1 - steps[:, 0], bright, bright * shift, dark, dark * shift, steps[:, -1]], axis=1
     )
-    return basis, slopes, spreads
+    return basis, slopes, spreads, shift
 
 
-def _boundaries(guess: Floats, edges: Floats, sign: Floats) -> Floats:
-    """Rows of the boundaries; bright segments have grown by guess[3] at either end."""
-    place: Floats = guess[0] + guess[1] * edges - guess[3] * sign
-    return place
-
-
-def _step(x: Floats, blur: Floats | float) -> tuple[Floats, Floats, Floats]:
-    """A step at 0 seen by pixels at ``x``, and its derivatives by ``x`` and by ``blur``.
+def _step(rows: Floats, places: Floats, blur: float) -> tuple[Floats, Floats, Floats]:
+    """Steps at ``places`` seen by consecutive rows, and their derivatives by row and by blur.
 
     A pixel averages over its area what the lens has blurred: the step is the mean of the normal
-    distribution's cumulative function over one pixel.
+    distribution's cumulative function over one pixel. All results are rows x places.
     """
-    before, after = (x - 0.5) / blur, (x + 0.5) / blur
-    low, high = _cumulative(before), _cumulative(after)
-    low_bell, high_bell = _bell(before), _bell(after)
-    step = blur * (after * high + high_bell - before * low - low_bell)
-    return step, high - low, high_bell - low_bell
+    borders = np.arange(len(rows) + 1) + (rows[0] - 0.5)
+    z = (borders[:, None] - places) / blur
+    curve, bell = _cumulative(z), np.exp(-0.5 * z * z) * (1 / math.sqrt(math.tau))
+    area = z * curve + bell
+    return blur * (area[1:] - area[:-1]), curve[1:] - curve[:-1], bell[1:] - bell[:-1]
 
 
 def _cumulative(z: Floats) -> Floats:
@@ -286,16 +290,11 @@ def _cumulative(z: Floats) -> Floats:
     return curve
 
 
-def _bell(z: Floats) -> Floats:
-    curve: Floats = np.exp(-0.5 * z * z) / math.sqrt(math.tau)
-    return curve
-
-
 def _solve(matrix: Floats, target: Floats) -> Floats | None:
     """Least squares by normal equations; a column without influence gets about zero."""
     normal = matrix.T @ matrix
-    diagonal = np.diag_indices_from(normal)
-    normal[diagonal] += _RIDGE * (normal[diagonal].max() + 1e-12)
+    diagonal = normal.flat[:: len(normal) + 1]
+    normal.flat[:: len(normal) + 1] = diagonal + _RIDGE * (diagonal.max() + 1e-12)
     try:
         solution: Floats = np.linalg.solve(normal, matrix.T @ target)
     except np.linalg.LinAlgError:

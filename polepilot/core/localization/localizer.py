@@ -277,11 +277,17 @@ class Localizer:
         self._begin(stamp, found)
 
     def _begin(self, stamp: float, found: Fix) -> None:
-        if isinstance(self._filter, PoseFilter):
+        started = self._filter.copy()
+        if isinstance(started, PoseFilter):
             sightings = [(m, self._landmarks[m.landmark]) for m in self._search.used]
-            self._filter.begin(found.pose, stamp, sightings, self._history)
+            started.begin(found.pose, stamp, sightings, self._history)
+            if _largest_sigma(started.pose_covariance) > self.settings.degraded_sigma:
+                # The stricter gate left some of them out: they do not fit together so well.
+                self._reason = "The landmarks seen so far do not fit together well enough."
+                return
         else:
-            self._filter.reset(found.pose, found.covariance)
+            started.reset(found.pose, found.covariance)
+        self._filter = started
         self._track, self._ahead = _Track(self._filter, stamp), None
         self._measured = (stamp, found.pose)
         self._status, self._reason = Status.TRACKING, ""

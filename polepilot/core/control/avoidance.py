@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polepilot.core.command import STAND, DriveCommand
 from polepilot.core.control.detour import Room, find
@@ -26,12 +27,20 @@ CONCERN = 0.25
 """A path that comes nearer than this to an obstacle has to be left."""
 WALL_ROOM = 0.05
 """From the body to walls and poles on a detour."""
+WALL_STOP = 0.025
+"""It stops where a detour leads nearer to a wall than this."""
 BEGIN = 0.80
 """So far before the place of conflict a detour begins."""
 LOOK = 2.0
 """So much of the path ahead is checked for conflicts, metres."""
+COME_AWAY = 0.6
+"""Metres from where it first had to stand; nearer it still counts as blocked."""
+FIRST_REJOIN = 1.6
+"""So far behind the conflict the path is taken up again at the latest, metres."""
 REJOIN = 6.0
-"""So far ahead the path is taken up again at the latest."""
+"""So far ahead of the robot after it has waited for long."""
+PATIENCE = 8.0
+"""Seconds of waiting, after which any way round will do: on the right, too, and a long one."""
 DETOUR_SPEED = 0.22
 REPLAN_PERIOD = 0.5
 BACK_OFF_AFTER = 3.0
@@ -40,6 +49,8 @@ BACK_OFF = 0.35
 FAR_LEFT = 0.35
 """An obstacle whose centre is farther left of the path than this does not stand on it: it is
 passed on the right. (The paper always turns left, which would mean a way of more than a metre.)"""
+RUN_UP = 15
+"""Samples of the path that have to be free, and forward, where it is taken up again."""
 LEAD_OUT = 30
 """Samples of the path that are appended to a detour, so that it ends along the path."""
 
@@ -69,6 +80,8 @@ class ObstacleAvoidance:
         """Of the present detour: 1 left, -1 right."""
         self._planned_at = -math.inf
         self._standing_since: float | None = None
+        self._blocked_since: float | None = None
+        self._blocked_at: Point = (0.0, 0.0)
         self._backing = 0.0
         self._last = STAND
         self.reason = ""
@@ -94,12 +107,15 @@ class ObstacleAvoidance:
         self._memory.forget()
         self._detour = None
         self._backing = 0.0
-        self._standing_since = None
+        self._standing_since = self._blocked_since = None
         self._last = STAND
         self.reason = ""
 
     def blocked_for(self, now: float) -> float:
-        """Seconds that it has been standing before an obstacle; 0 while it drives."""
+        """Seconds since the robot last got ahead; 0 unless something is in the way."""
+        return 0.0 if self._blocked_since is None else now - self._blocked_since
+
+    def _stood_for(self, now: float) -> float:
         return 0.0 if self._standing_since is None else now - self._standing_since
 
     def update(
@@ -124,13 +140,24 @@ class ObstacleAvoidance:
         if not self._safe(pose, command):
             self.reason = "Waiting: something is too close ahead."
             command = DriveCommand(0.0, command.steering)
-        if command.speed == 0 and self.active:
-            if self._standing_since is None:
-                self._standing_since = now
-        else:
-            self._standing_since = None
+        self._watch(now, pose, command)
         self._last = command
         return command
+
+    def _watch(self, now: float, pose: Pose2D, command: DriveCommand) -> None:
+        """For how long has it been standing, and has it not come away from here?"""
+        if not self.active:
+            self._standing_since = self._blocked_since = None
+            return
+        if command.speed != 0:
+            self._standing_since = None
+        elif self._standing_since is None:
+            self._standing_since = now
+        if self._blocked_since is None:
+            if command.speed == 0:
+                self._blocked_since, self._blocked_at = now, pose.position
+        elif pose.distance_to(self._blocked_at) > COME_AWAY:
+            self._blocked_since = None
 
     def _choose(self, now: float, dt: float, pose: Pose2D, tracker: PathTracker) -> DriveCommand:
         if self._backing > 0:
@@ -141,14 +168,15 @@ class ObstacleAvoidance:
         if conflict is None:
             self.reason = ""
             command = tracker.update(pose, dt)
-            if self._memory.obstacles and command.speed > DETOUR_SPEED:
+            near = self._gaps(np.array([pose.position]))[0] < LOOK
+            if near and command.speed > DETOUR_SPEED:
                 return DriveCommand(DETOUR_SPEED, command.steering)
             return command
         if now - self._planned_at >= REPLAN_PERIOD:
             self._side = 0
             if self._plan(now, pose, tracker, conflict):
                 return self._follow(now, dt, pose, tracker)
-        if self.blocked_for(now) > BACK_OFF_AFTER and self._close(pose):
+        if self._stood_for(now) > BACK_OFF_AFTER and self._close(pose):
             self._backing = BACK_OFF
             self._standing_since = None
         return STAND
@@ -160,8 +188,8 @@ class ObstacleAvoidance:
         discs = Scenery([], self.obstacles)
         return discs.distances(points) - self._vehicle.body_radius
 
-    def _conflict(self, tracker: PathTracker) -> tuple[float, float, Remembered] | None:
-        """First and last place of conflict on the path ahead, and the obstacle; or None."""
+    def _conflict(self, tracker: PathTracker) -> tuple[float, Remembered] | None:
+        """Where the next conflict on the path ahead ends, and the obstacle; or None."""
         known = self._memory.obstacles
         if not known:
             return None
@@ -180,7 +208,7 @@ class ObstacleAvoidance:
         last = float(inside[breaks[0]] if len(breaks) else inside[-1])
         place = points[first]
         obstacle = min(known, key=lambda one: math.dist(one.position, place))
-        return float(along[first]), last, obstacle
+        return last, obstacle
 
     def _close(self, pose: Pose2D) -> bool:
         """Whether more room in front would help."""
@@ -188,24 +216,29 @@ class ObstacleAvoidance:
         return bool(nearest < 0.8)
 
     def _safe(self, pose: Pose2D, command: DriveCommand) -> bool:
-        """Whether the robot could still stop before an obstacle after another moment of this."""
-        discs = Scenery([], [one.body for one in self._memory.obstacles])
-        if not discs.discs or command.speed == 0:
+        """Whether the robot could still stop in time after another moment of this command.
+
+        Before obstacles always; before walls where it is not on its planned path.
+        """
+        bodies = [one.body for one in self._memory.obstacles]
+        if command.speed == 0 or not (bodies or self.active):
             return True
+        discs = Scenery([], bodies)
+        walls = self._scenery.near(pose.position, 1.0) if self.active else Scenery()
         speed = abs(command.speed)
         reach = 0.06 + speed * 0.2 + speed**2 / (2 * self._vehicle.max_acceleration)
         curvature = math.tan(command.steering) / self._vehicle.wheelbase
-        gap = discs.distance(pose.position) - self._vehicle.body_radius
-        steps = 4
-        for index in range(1, steps + 1):
-            way = math.copysign(reach * index / steps, command.speed)
-            turn = way * curvature
-            ahead = (
-                pose.x + way * math.cos(pose.heading + turn / 2),
-                pose.y + way * math.sin(pose.heading + turn / 2),
-            )
-            then = discs.distance(ahead) - self._vehicle.body_radius
-            if then < LEAST + 0.02 and then < gap - 0.005:
+        way = np.sign(command.speed) * reach * np.arange(5) / 4
+        turn = way * curvature / 2
+        line = np.column_stack(
+            [
+                pose.x + way * np.cos(pose.heading + turn),
+                pose.y + way * np.sin(pose.heading + turn),
+            ]
+        )
+        for scenery, least in ((discs, LEAST + 0.02), (walls, WALL_STOP)):
+            gaps = scenery.distances(line) - self._vehicle.body_radius
+            if ((gaps[1:] < least) & (gaps[1:] < gaps[0] - 0.005)).any():
                 return False
         return True
 
@@ -216,12 +249,12 @@ class ObstacleAvoidance:
         now: float,
         pose: Pose2D,
         tracker: PathTracker,
-        conflict: tuple[float, float, Remembered],
+        conflict: tuple[float, Remembered],
     ) -> bool:
         """Look for a way round; without one, say why."""
         self._planned_at = now
         self._detour = None
-        first, last, obstacle = conflict
+        last, obstacle = conflict
         points, along, gears = tracker.path_ahead(REJOIN)
         place = int(np.argmin(np.hypot(*(points - obstacle.center).T)))
         tangent = _tangent(points, place)
@@ -230,49 +263,57 @@ class ObstacleAvoidance:
         sides = [self._side] if self._side else [1]
         if not self._side and left_of_path > FAR_LEFT:
             sides = [-1, 1]
-        free = (self._gaps(points) >= CONCERN) & (gears > 0)
+        farthest = last + FIRST_REJOIN
+        if self.blocked_for(now) > PATIENCE:
+            sides, farthest = [1, -1], float(along[-1])
+        free = _stays((self._gaps(points) >= CONCERN) & (gears > 0))
+        wanted = np.arange(last + 0.30, min(farthest, float(along[-1])) + 0.01, 0.30)
+        places = np.searchsorted(along, wanted)
+        places = places[places < len(points)]
+        places = places[free[places]]
         x, y = obstacle.position
         where = f"at {x:.1f}, {y:.1f}"
         for side in sides:
             # The line from the obstacle to its other side is not to be crossed.
             barrier = (obstacle.position, wrap_angle(tangent - side * math.pi / 2))
-            for wanted in np.arange(last + 0.30, min(last + 1.6, along[-1] + 0.01), 0.45):
-                index = int(np.searchsorted(along, wanted))
-                if index >= len(points) or not free[index] or along[index] < first:
-                    continue
-                if self._to(pose, points[index:], float(along[index]), barrier):
-                    self._side = side
-                    name = "left" if side > 0 else "right"
-                    self.reason = f"Passing an obstacle {where} on the {name}."
-                    return True
+            if self._to(pose, points, along, places, barrier):
+                self._side = side
+                name = "left" if side > 0 else "right"
+                self.reason = f"Passing an obstacle {where} on the {name}."
+                return True
         if not free[along > last].any():
             self.reason = f"Waiting: the way ahead is occupied {where} up to its end."
         else:
-            self.reason = f"Waiting: there is no room to pass the obstacle {where} on the left."
+            name = "on the left" if sides == [1] else "on either side"
+            self.reason = f"Waiting: there is no room to pass the obstacle {where} {name}."
         return False
 
     def _to(
         self,
         pose: Pose2D,
-        rest: Floats,
-        rejoin_at: float,
+        points: Floats,
+        along: Floats,
+        places: NDArray[np.int64],
         barrier: tuple[Point, float],
     ) -> bool:
-        """Plan a detour that ends where ``rest`` of the path begins."""
+        """Plan a detour to one of these places of the path."""
         vehicle = self._vehicle
         room = Room(
             walls=vehicle.body_radius + WALL_ROOM,
             least=vehicle.body_radius + LEAST + 0.04,
             wanted=vehicle.body_radius + KEEP,
         )
-        goal = (float(rest[0, 0]), float(rest[0, 1]))
-        way = find(pose.position, goal, self.obstacles, barrier, self._scenery, room)
-        if way is None:
+        goals = [(float(points[index, 0]), float(points[index, 1])) for index in places]
+        found = find(pose.position, goals, self.obstacles, barrier, self._scenery, room)
+        if found is None:
             return False
-        self._way = way
-        self._rejoin_at = rejoin_at
+        index = int(places[found[0]])
+        self._way = found[1]
+        self._rejoin_at = float(along[index])
         self._about = barrier[0]
-        path = np.vstack([way, rest[1 : 1 + LEAD_OUT]])
+        # What follows in the same gear: the detour is to end along the path, but not to back.
+        rest = points[index + 1 : index + 1 + LEAD_OUT]
+        path = np.vstack([self._way, rest[: _before_gear_change(rest)]])
         self._detour = PathTracker(_as_plan(path), vehicle, rolling=self._last)
         return True
 
@@ -289,22 +330,22 @@ class ObstacleAvoidance:
         rest, _, _ = detour.path_ahead(1.5)
         tight = len(rest) > 0 and self._gaps(rest).min() < LEAST + 0.02
         astray = abs(detour.deviation) > 0.12 or detour.off_route
-        stuck = self.blocked_for(now) > REPLAN_PERIOD
+        stuck = self._stood_for(now) > REPLAN_PERIOD
         if (tight or astray or stuck) and now - self._planned_at >= REPLAN_PERIOD:
             found = self._plan(now, pose, tracker, self._remaining(pose, tracker))
             detour = self._detour
             if not found or detour is None:
-                if self.blocked_for(now) > BACK_OFF_AFTER:
+                if self._stood_for(now) > BACK_OFF_AFTER:
                     self._backing = BACK_OFF
                 return STAND
-        if stuck and self.blocked_for(now) > BACK_OFF_AFTER:
+        if stuck and self._stood_for(now) > BACK_OFF_AFTER:
             self._backing = BACK_OFF
             self._detour = None
             return STAND
         command = detour.update(pose, dt)
         return DriveCommand(min(command.speed, DETOUR_SPEED), command.steering)
 
-    def _remaining(self, pose: Pose2D, tracker: PathTracker) -> tuple[float, float, Remembered]:
+    def _remaining(self, pose: Pose2D, tracker: PathTracker) -> tuple[float, Remembered]:
         """The conflict that the present detour is about, seen afresh."""
         conflict = self._conflict(tracker)
         if conflict is not None:
@@ -313,7 +354,7 @@ class ObstacleAvoidance:
         nothing = Remembered(np.array(self._about), np.eye(2), 0.0)
         known = self._memory.obstacles or [nothing]
         nearest = min(known, key=lambda one: float(np.hypot(*(one.center - here))))
-        return tracker.progress, max(self._rejoin_at - 0.30, tracker.progress), nearest
+        return max(self._rejoin_at - 0.30, tracker.progress), nearest
 
     def _back_off(self, dt: float, pose: Pose2D) -> DriveCommand:
         """Straight back, as far as the map says that there is room; nothing looks that way."""
@@ -327,6 +368,23 @@ class ObstacleAvoidance:
             return STAND
         self.reason = "Backing off to make room for passing an obstacle."
         return DriveCommand(-0.12, 0.0)
+
+
+def _stays(good: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Where it is good, and remains so for the next 30 cm (or to the end)."""
+    result = good.copy()
+    for shift in range(1, min(RUN_UP, len(good))):
+        result[:-shift] &= good[shift:]
+    return result
+
+
+def _before_gear_change(points: Floats) -> int:
+    """How many of the points come before the line turns back on itself."""
+    steps = np.diff(points, axis=0)
+    if len(steps) < 2:
+        return len(points)
+    back = (steps[:-1] * steps[1:]).sum(axis=1) < 0
+    return int(np.argmax(back)) + 2 if back.any() else len(points)
 
 
 def _tangent(points: Floats, index: int) -> float:

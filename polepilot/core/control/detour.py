@@ -38,35 +38,42 @@ class Room:
 
 def find(
     start: Point,
-    goal: Point,
+    goals: Sequence[Point],
     obstacles: Sequence[Disc],
     barrier: tuple[Point, float],
     scenery: Scenery,
     room: Room,
-) -> Floats | None:
-    """The way from start to goal that keeps clear of everything, N x 2, or None.
+) -> tuple[int, Floats] | None:
+    """The cheapest way from start to any of the goals that keeps clear of everything.
 
     Args:
         barrier: a place and a direction: the way does not cross the line from there.
+
+    Returns:
+        Which goal, and the way, N x 2 in `map`; None where no goal can be reached.
     """
-    low, high = _bounds([start, goal, *(center for center, _ in obstacles)])
+    if not goals:
+        return None
+    low, high = _bounds([start, *goals, *(center for center, _ in obstacles)])
     shape = tuple(np.ceil((high - low) / CELL).astype(int) + 1)
     grid = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), axis=-1)
     places = low + grid.reshape(-1, 2) * CELL
     cost = _cost(places, start, obstacles, scenery, room).reshape(shape)
-    first, last = (_cell(place, low, shape) for place in (start, goal))
     end = (
         barrier[0][0] + BARRIER * math.cos(barrier[1]),
         barrier[0][1] + BARRIER * math.sin(barrier[1]),
     )
     fence = Scenery([(barrier[0], end)]).distances(places).reshape(shape)
     cost[fence < 0.75 * CELL] = np.inf
-    cells = _search(cost, first, last)
+    cells = _search(cost, _cell(start, low, shape), {_cell(goal, low, shape) for goal in goals})
     if cells is None:
         return None
+    reached = next(i for i, goal in enumerate(goals) if _cell(goal, low, shape) == cells[-1])
     way = low + np.asarray(cells, float) * CELL
-    way[0], way[-1] = start, goal
-    return _smooth(way, low, cost)
+    if len(way) < 2:
+        way = np.vstack([way, way])
+    way[0], way[-1] = start, goals[reached]
+    return reached, _smooth(way, low, cost)
 
 
 def _bounds(points: Sequence[Point]) -> tuple[Floats, Floats]:
@@ -106,38 +113,33 @@ def _cost(
 
 
 def _search(
-    cost: Raster, first: tuple[int, int], last: tuple[int, int]
+    cost: Raster, first: tuple[int, int], goals: set[tuple[int, int]]
 ) -> list[tuple[int, int]] | None:
-    """A* over eight neighbours."""
-    if math.isinf(cost[first]) or math.isinf(cost[last]):
-        return None
+    """Dijkstra over eight neighbours, to the first goal that is reached."""
     rows, columns = cost.shape
     price = cost.tolist()
     best = {first: 0.0}
     came: dict[tuple[int, int], tuple[int, int]] = {}
-    queue = [(math.dist(first, last), first)]
-    closed: set[tuple[int, int]] = set()
+    queue = [(0.0, first)]
     while queue:
-        _, here = heapq.heappop(queue)
-        if here == last:
+        so_far, here = heapq.heappop(queue)
+        if so_far > best[here]:
+            continue
+        if here in goals:
             way = [here]
             while here in came:
                 here = came[here]
                 way.append(here)
             return way[::-1]
-        if here in closed:
-            continue
-        closed.add(here)
-        so_far = best[here]
         for row, column, length in _STEPS:
             there = (here[0] + row, here[1] + column)
-            if not (0 <= there[0] < rows and 0 <= there[1] < columns) or there in closed:
+            if not (0 <= there[0] < rows and 0 <= there[1] < columns):
                 continue
             total = so_far + length * price[there[0]][there[1]]
             if total < best.get(there, math.inf):
                 best[there] = total
                 came[there] = here
-                heapq.heappush(queue, (total + math.dist(there, last), there))
+                heapq.heappush(queue, (total, there))
     return None
 
 

@@ -21,6 +21,10 @@ TOLERANCE = 0.12
 """A reading is explained by the site if it is no shorter than expected by more than this."""
 FORGET = 10.0
 """Seconds after the last reading."""
+FORGET_NEAR = 40.0
+"""The same while the robot is near: what stands beside or behind it is in no sensor's view."""
+NEAR = 2.0
+"""Metres."""
 CONFIRM = 3
 """Readings before an obstacle counts."""
 MISSES = 4
@@ -119,9 +123,7 @@ class ObstacleMemory:
             ):
                 self._hit(now, sensor, reading)
             self._look_through(sensor, reading)
-        self._known = [
-            one for one in self._known if now - one.seen <= FORGET and one.misses < MISSES
-        ]
+        self._known = [one for one in self._known if _kept(one, now, base)]
 
     def _explained(
         self, walls: Scenery, sensor: Pose2D, reading: float, position: float, heading: float
@@ -182,6 +184,11 @@ class ObstacleMemory:
                 shift = min(missing, 0.05)
                 heading = sensor.heading + side * (math.pi / 2 + HALF_BEAM)
                 one.center = one.center + shift * np.array([math.cos(heading), math.sin(heading)])
+
+
+def _kept(one: Remembered, now: float, base: Pose2D) -> bool:
+    longest = FORGET_NEAR if base.distance_to(one.position) < NEAR else FORGET
+    return now - one.seen <= longest and one.misses < MISSES
 
 
 def _may_be(one: Remembered, seen: NDArray[np.float64], noise: NDArray[np.float64]) -> bool:

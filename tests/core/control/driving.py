@@ -133,6 +133,7 @@ def meet(
     site: Site,
     people: list[Obstacle],
     *,
+    gear: list[int] | None = None,
     start: Pose2D | None = None,
     seed: int = 1,
     longest: float = 80.0,
@@ -144,7 +145,7 @@ def meet(
         (x, y), (next_x, next_y) = path[0], path[1]
         start = Pose2D(x, y, math.atan2(next_y - y, next_x - x))
     motion = Motion(VEHICLE, PanUnit(), Disturbances(), rng, full_speed=FULL_SPEED, pose=start)
-    tracker = PathTracker(plan_of(path), VEHICLE)
+    tracker = PathTracker(plan_of(path, gear), VEHICLE)
     avoidance = ObstacleAvoidance(Proximity(), VEHICLE, site)
     walls = Scenery(site.segments())
     poles = [(mark.position, mark.kind.diameter / 2) for mark in site.landmarks]

@@ -8,7 +8,7 @@ from core.control.driving import VEHICLE, arc, meet, plan_of
 
 from polepilot.core.control.avoidance import ObstacleAvoidance
 from polepilot.core.control.detour import Room, find
-from polepilot.core.control.memory import FORGET, ObstacleMemory
+from polepilot.core.control.memory import FORGET, FORGET_NEAR, ObstacleMemory
 from polepilot.core.control.tracker import PathTracker
 from polepilot.core.geometry import Pose2D
 from polepilot.core.landmark import Landmark
@@ -86,6 +86,16 @@ def test_left_blocked_by_a_wall_means_waiting_with_a_reason() -> None:
     assert met.to_walls >= 0.15
     assert any("no room" in reason for reason in met.reasons)
     assert met.stood > 20
+
+
+def test_after_long_waiting_the_right_will_do() -> None:
+    # Left of the line 0.6 m are too little to pass, right of it there is room.
+    site = Site(boundary=((0, 0), (8, 0), (8, 3.6), (0, 3.6)))
+    met = meet(LINE, site, [Obstacle(*PERSON)])
+    assert met.done
+    assert met.to_people >= 0.15
+    assert met.stood > 7.5
+    assert math.dist(met.end.position, LINE[-1]) < 0.03
 
 
 def test_passage_goes_on_when_the_person_has_left() -> None:
@@ -183,14 +193,32 @@ def test_memory_gives_up_what_is_seen_to_be_gone() -> None:
     assert memory.obstacles == []
 
 
-def test_memory_fades_out_of_sight() -> None:
+@pytest.mark.parametrize(("x", "longest"), [(0.9, FORGET), (2.0, FORGET_NEAR)])
+def test_memory_fades_out_of_sight(x: float, longest: float) -> None:
     memory = ObstacleMemory(Proximity(), Scenery(ROOM.segments()))
     now = looks(memory, 6, 0.8)
-    away = Pose2D(2, 3, math.pi)
-    memory.observe(now + FORGET - 1, away, (1.5, 1.5, 1.5), 0.01, 0.005)
+    away = Pose2D(x, 3, math.pi)
+    memory.observe(now + longest - 1, away, (1.5, 1.5, 1.5), 0.01, 0.005)
     assert len(memory.obstacles) == 1
-    memory.observe(now + FORGET + 1, away, (1.5, 1.5, 1.5), 0.01, 0.005)
+    memory.observe(now + longest + 1, away, (1.5, 1.5, 1.5), 0.01, 0.005)
     assert memory.obstacles == []
+
+
+def test_detour_does_not_rejoin_just_before_backing() -> None:
+    # The path turns back 20 cm behind the person's shadow: it is taken up where it goes forward.
+    path = [(1.0, 3.0), (5.1, 3.0), (4.9, 3.0), (7.0, 3.0)]
+    met = meet(path, ROOM, [Obstacle(*PERSON)], gear=[1, -1, 1])
+    assert met.done
+    assert met.to_people >= 0.15
+    assert math.dist(met.end.position, path[-1]) < 0.03
+
+
+def test_person_behind_a_backing_robot_is_not_forgotten() -> None:
+    # Past the person on the left, back on the line, and then straight back towards the person.
+    path = [(1.0, 3.0), (5.7, 3.0), (4.3, 3.0)]
+    met = meet(path, ROOM, [Obstacle(*PERSON)], gear=[1, -1], longest=40)
+    assert met.to_people >= 0.15
+    assert met.stood > 10
 
 
 def test_wall_within_tolerance_is_explained_and_something_before_it_is_not() -> None:
@@ -206,8 +234,11 @@ def test_detour_keeps_its_distances() -> None:
     walls = Scenery([((0, 4), (8, 4))])
     person = ((4.0, 3.0), 0.25)
     room = Room(walls=0.19, least=0.33, wanted=0.44)
-    way = find((2.5, 3.0), (5.5, 3.0), [person], ((4.0, 3.0), -math.pi / 2), walls, room)
-    assert way is not None
+    goals = [(7.5, 3.0), (5.5, 3.0)]
+    found = find((2.5, 3.0), goals, [person], ((4.0, 3.0), -math.pi / 2), walls, room)
+    assert found is not None
+    reached, way = found
+    assert reached == 1
     assert tuple(way[0]) == (2.5, 3.0)
     assert tuple(way[-1]) == (5.5, 3.0)
     gaps = Scenery([], [person]).distances(way)
@@ -223,5 +254,6 @@ def test_detour_that_does_not_exist() -> None:
     room = Room(walls=0.19, least=0.33, wanted=0.44)
     barrier = ((4.0, 3.0), -math.pi / 2)
     person = ((4.0, 3.0), 0.25)
-    assert find((2.5, 3.0), (5.5, 3.0), [person], barrier, walls, room) is None
-    assert find((2.5, 3.0), (4.0, 3.2), [person], barrier, Scenery(), room) is None
+    assert find((2.5, 3.0), [(5.5, 3.0)], [person], barrier, walls, room) is None
+    assert find((2.5, 3.0), [(4.0, 3.2)], [person], barrier, Scenery(), room) is None
+    assert find((2.5, 3.0), [], [person], barrier, Scenery(), room) is None

@@ -1,4 +1,4 @@
-"""The default detector: colour -> strips -> edges -> code -> measure."""
+"""The default detector: colour -> strips -> straight -> edges -> code -> measure."""
 
 from __future__ import annotations
 
@@ -11,15 +11,9 @@ from polepilot.core.observation import Detection, Image
 from polepilot.core.vehicle import Camera
 from polepilot.core.vision import color
 from polepilot.core.vision.code import read_code
-from polepilot.core.vision.edges import (
-    Column,
-    Scale,
-    fit_scale,
-    rough_code,
-    segment_levels,
-    straighten,
-)
+from polepilot.core.vision.edges import Scale, fit_scale, segment_levels
 from polepilot.core.vision.measure import bearing_of, half_width_of, range_of
+from polepilot.core.vision.straight import Column, rough_code, straighten
 from polepilot.core.vision.strips import Strip, find_strips
 
 RANGE_FLOOR = 0.0006

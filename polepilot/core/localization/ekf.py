@@ -139,7 +139,7 @@ class PoseFilter:
         stamp: float,
         sightings: Sequence[tuple[RangeBearing, Landmark]],
         history: OdometryHistory,
-    ) -> None:
+    ) -> float:
         """Start at a fix, ``pose`` at ``stamp``, by taking its ``sightings`` in, oldest first.
 
         The fix serves as the point of linearization only. Its own covariance would not say how
@@ -149,6 +149,7 @@ class PoseFilter:
         factor, offset = self.speed_factor, self.steering_offset
         before = history.advance(pose, stamp, start, factor, offset)
         self.reset(before, np.diag(np.square(_WIDE)))
+        taken = 0
         for sighting, landmark in sightings:
             for step in history.steps(start, sighting.stamp):
                 self.predict(step)
@@ -156,8 +157,10 @@ class PoseFilter:
             innovation = self.innovation(sighting, landmark)
             if innovation.squared <= self.gate:
                 self.update(innovation)
+                taken += 1
         for step in history.steps(start, stamp):
             self.predict(step)
+        return taken / max(len(sightings), 1)
 
     @property
     def speed_factor(self) -> float:

@@ -30,6 +30,10 @@ from polepilot.core.vehicle import Vehicle
 
 Method = Literal["ekf", "paper"]
 
+_FITTING = 0.7
+"""Share of a fix's sightings that the filter must take, or the fix is not believed."""
+_PROBATION = 10.0
+"""Seconds that a new pose must last before what was learnt with it outlives it."""
 _LAG_STEP = 0.01
 """The time constants are followed in steps of this, seconds, and within these limits."""
 _SHORTEST_LAG, _LONGEST_LAG = 0.01, 0.5
@@ -137,6 +141,7 @@ class Localizer:
             self._filter = PoseFilter(
                 vehicle.wheelbase, camera_forward, self.settings.noise, self.settings.gate
             )
+        self._before: tuple[float, _Filter, tuple[float, float]] | None = None
         self._track: _Track | None = None
         self._ahead: _Track | None = None
         self._status = Status.FIXING
@@ -191,7 +196,13 @@ class Localizer:
 
     def refix(self, reason: str) -> None:
         """Forget the pose and look for it anew; what contradicted the old one is kept."""
-        self._track = self._ahead = None
+        if self._before is not None and self._track is not None:
+            begun, tracked, lags = self._before
+            if self._track.stamp - begun < _PROBATION:
+                # A pose that did not last was wrong, and so is what was learnt from it.
+                self._filter = tracked
+                self._history.retune(*lags)
+        self._track = self._ahead = self._before = None
         self._measured = self._predicted = None
         self._status, self._reason = Status.FIXING, reason
         self._search.clear()
@@ -280,13 +291,16 @@ class Localizer:
         started = self._filter.copy()
         if isinstance(started, PoseFilter):
             sightings = [(m, self._landmarks[m.landmark]) for m in self._search.used]
-            started.begin(found.pose, stamp, sightings, self._history)
-            if _largest_sigma(started.pose_covariance) > self.settings.degraded_sigma:
+            share = started.begin(found.pose, stamp, sightings, self._history)
+            sigma = _largest_sigma(started.pose_covariance)
+            if share < _FITTING or sigma > self.settings.degraded_sigma:
                 # The stricter gate left some of them out: they do not fit together so well.
                 self._reason = "The landmarks seen so far do not fit together well enough."
                 return
         else:
             started.reset(found.pose, found.covariance)
+        lags = (self._history.speed_lag, self._history.steering_lag)
+        self._before = (stamp, self._filter, lags)
         self._filter = started
         self._track, self._ahead = _Track(self._filter, stamp), None
         self._measured = (stamp, found.pose)

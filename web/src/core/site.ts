@@ -225,6 +225,22 @@ export function title(site: Site, at: Selection): string {
   }
 }
 
+/** A refusal of the server in the words of this page: "islands[1] ..." is "Island 2 ...". */
+export function inWords(message: string, site: Site): string {
+  const kinds: Record<string, Kind> = {
+    islands: "island",
+    walls: "wall",
+    landmarks: "landmark",
+    routes: "route",
+  };
+  const named = message
+    .replace(/^(the )?site: /i, "")
+    .replace(/\b(islands|walls|landmarks|routes)\[(\d+)\]/g, (_, list: string, index: string) =>
+      title(site, { kind: kinds[list], index: Number(index) }),
+    );
+  return named.charAt(0).toUpperCase() + named.slice(1);
+}
+
 export function siteBounds(site: Site): Bounds | null {
   return bounds(shapes(site).flatMap((at) => vertices(site, at)));
 }

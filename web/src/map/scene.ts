@@ -158,8 +158,8 @@ function paintRecorded(paper: Paper): void {
   const show = shown.value;
   robot.paintCovered(paper, data.estimated, record.mode === "scan" ? record.plan.tool_width : null);
   if (show.real) robot.paintTrail(paper, data.real, paper.palette.real);
-  if (show.measured) robot.paintDots(paper, data.measured);
   if (show.estimated) robot.paintTrail(paper, data.estimated);
+  if (show.measured) robot.paintDots(paper, data.measured);
   const t = moment.value;
   if (t === null) return;
   const { rows } = data;

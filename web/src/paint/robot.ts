@@ -49,7 +49,7 @@ function thinned(points: readonly Point[], apart: number): readonly Point[] {
 
 export function paintDots(paper: Paper, dots: readonly Point[]): void {
   const { ctx, palette } = paper;
-  const radius = 2 * palette.line;
+  const radius = 1.75 * palette.line;
   ctx.save();
   ctx.fillStyle = palette.measured;
   for (const dot of dots) {

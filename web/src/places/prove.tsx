@@ -24,6 +24,8 @@ import { ErrorChart } from "./chart";
 const OUTCOMES: Record<string, string> = {
   done: "Done",
   ended: "Ended by hand",
+  paused: "Ended early",
+  timeout: "Ran out of time",
   failed: "Failed",
   interrupted: "Interrupted: the service went down",
 };

@@ -9,7 +9,15 @@ import { computed, effect, signal } from "@preact/signals";
 import * as api from "../api/client";
 import type { SiteCheck, SiteRecord } from "../api/types";
 import * as history from "../core/history";
-import { asSite, emptySite, exists, removed, type Selection, type Site } from "../core/site";
+import {
+  asSite,
+  emptySite,
+  exists,
+  inWords,
+  removed,
+  type Selection,
+  type Site,
+} from "../core/site";
 import { formatSelection, go, location, parseSelection } from "./location";
 import { doing, say, sentenceOf } from "./notice";
 import { readRobotSite } from "./robot";
@@ -149,7 +157,7 @@ export async function save(): Promise<boolean> {
     if (error instanceof api.ApiError && error.status === 412 && base.id !== null) {
       conflict.value = await doing("Reading the other version", () => api.readSite(base.id!));
     } else {
-      say(`Not saved. ${sentenceOf(error)}`, "fault");
+      say(`Not saved. ${inWords(sentenceOf(error), sent)}`, "fault");
     }
     return false;
   } finally {
@@ -211,7 +219,12 @@ effect(() => {
   timer = setTimeout(async () => {
     const turn = ++asked;
     const answer = await api.checkSite(drawn).catch(() => null);
-    if (turn === asked && answer) check.value = answer;
+    if (turn !== asked || !answer) return;
+    const problems = answer.problems.map((problem) => ({
+      ...problem,
+      message: inWords(problem.message, drawn),
+    }));
+    check.value = { ...answer, problems };
   }, 300);
 });
 

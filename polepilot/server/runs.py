@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -36,7 +37,7 @@ def read_messages(path: Path) -> Iterator[tuple[str, int, bytes]]:
                     channels[record.id] = record.topic
                 elif isinstance(record, Message):
                     yield channels[record.channel_id], record.log_time, record.data
-        except (McapError, KeyError, ValueError):
+        except (McapError, struct.error, KeyError, ValueError):
             # The end of a file that was never finished: what came before it is good.
             return
 

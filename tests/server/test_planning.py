@@ -1,0 +1,184 @@
+"""Plans over REST, computed by the planning process."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import time
+from typing import Any
+
+import pytest
+from server.fakes import SQUARE, FakeRobot, TestClient
+from shapely import MultiPolygon, box
+
+from polepilot.core.errors import InputError, PlanError, SiteError
+from polepilot.core.geometry import Pose2D
+from polepilot.core.vehicle import Vehicle
+from polepilot.server.convert import multipolygon_of, plan_of
+from polepilot.server.errors import BusyError
+from polepilot.server.planner import Planner
+from polepilot.server.services import Services
+
+API = "/api/v1"
+JOB: dict[str, Any] = {
+    "site": SQUARE,
+    "mode": "route",
+    "route": "Line",
+    "options": {"start": [1.0, 1.0, 0.0]},
+    "area": None,
+}
+
+
+@pytest.fixture
+def square(client: TestClient) -> int:
+    """The number of the square site, which the robot works on."""
+    site_id: int = client.post(f"{API}/sites", json=SQUARE).json()["id"]
+    client.put(f"{API}/robot/site", json={"site_id": site_id})
+    return site_id
+
+
+def test_a_scan(client: TestClient, services: Services, square: int) -> None:
+    answer = client.post(f"{API}/plans", json={"site_id": square, "mode": "scan"})
+    assert answer.status_code == 201, answer.text
+    plan = answer.json()
+    assert client.get(f"{API}/plans/{plan['id']}").json() == plan
+    assert plan["predicted"]["coverage"] > 0.9
+    assert len(plan["gear"]) == len(plan["path"]) - 1
+    assert plan["tool_width"] == 0.4
+    assert 20 < multipolygon_of(plan["area"]).area < 30
+    # What is kept is what can be driven.
+    kept = plan_of(services.store.plan(plan["id"]))
+    assert kept.path.tolist() == plan["path"]
+    assert kept.predicted.coverage == plan["predicted"]["coverage"]
+
+
+def test_a_plan_begins_where_the_robot_stands(
+    client: TestClient, robot: FakeRobot, square: int
+) -> None:
+    robot.pose = Pose2D(3.0, 3.0, 1.0)
+    client.post(f"{API}/robot/clear")
+    body = {"site_id": square, "mode": "route", "route": "Line"}
+    assert client.post(f"{API}/plans", json=body).json()["path"][0] == [3.0, 3.0]
+    there = client.post(f"{API}/plans", json={**body, "start": [2.0, 2.0]}).json()
+    assert there["path"][0] == [2.0, 2.0]
+    # On another site than the robot's, only the drawing can say.
+    other = client.post(f"{API}/sites", json=SQUARE).json()["id"]
+    elsewhere = client.post(f"{API}/plans", json={**body, "site_id": other}).json()
+    assert elsewhere["path"][0] == [1.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "status", "word"),
+    [
+        ({"site_id": 77}, 404, "site"),
+        ({"mode": "route", "route": "Nowhere"}, 422, "Nowhere"),
+        ({"mode": "route"}, 422, "route"),
+        ({"mode": "walk"}, 422, "mode"),
+        ({"start": [50.0, 50.0]}, 422, "start"),
+        ({"start": [1.0]}, 422, "start"),
+        ({"tool_width": 0}, 422, "tool_width"),
+        ({"tool_width": 0.001}, 422, "tool_width"),
+        ({"clearance": -0.1}, 422, "clearance"),
+        ({"width": 1}, 422, "width"),
+        ({"pending_of": 9}, 404, "run"),
+    ],
+)
+def test_what_cannot_be_planned(
+    client: TestClient, square: int, changes: dict[str, Any], status: int, word: str
+) -> None:
+    body = {"site_id": square, "mode": "scan", **changes}
+    answer = client.post(f"{API}/plans", json=body)
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert word in answer.json()["detail"]
+
+
+def test_what_a_run_left_is_planned(client: TestClient, robot: FakeRobot, square: int) -> None:
+    plan = client.post(f"{API}/plans", json={"site_id": square, "mode": "scan"}).json()
+    run = client.post(f"{API}/missions", json={"plan_id": plan["id"]}).json()
+    pending = {"site_id": square, "mode": "scan", "pending_of": run["id"]}
+    refused = client.post(f"{API}/plans", json=pending)
+    assert (refused.status_code, refused.json()["code"]) == (409, "run_active")
+    robot.missed = MultiPolygon([box(3, 2, 4, 3)])
+    client.post(f"{API}/mission/end")
+    end = time.monotonic() + 5
+    while client.get(f"{API}/runs/{run['id']}").json()["outcome"] is None:
+        assert time.monotonic() < end
+    rest = client.post(f"{API}/plans", json=pending)
+    assert rest.status_code == 201, rest.text
+    document = rest.json()
+    assert document["pending_of"] == run["id"]
+    assert multipolygon_of(document["area"]).area == pytest.approx(1.0, rel=0.05)
+    assert document["predicted"]["length"] < plan["predicted"]["length"] / 3
+    wrong = client.post(f"{API}/plans", json={**pending, "site_id": 1})
+    assert wrong.status_code == 422
+    assert "pending_of" in wrong.json()["detail"]
+
+
+def test_nothing_left(client: TestClient, square: int) -> None:
+    plan = client.post(f"{API}/plans", json={"site_id": square, "mode": "scan"}).json()
+    run = client.post(f"{API}/missions", json={"plan_id": plan["id"]}).json()
+    client.post(f"{API}/mission/end")
+    end = time.monotonic() + 5
+    while client.get(f"{API}/runs/{run['id']}").json()["outcome"] is None:
+        assert time.monotonic() < end
+    body = {"site_id": square, "mode": "scan", "pending_of": run["id"]}
+    answer = client.post(f"{API}/plans", json=body)
+    assert (answer.status_code, answer.json()["code"]) == (422, "nothing_pending")
+
+
+class TestProcess:
+    """The process that plans, on its own."""
+
+    def test_survives_what_it_is_told(self) -> None:
+        async def ask() -> None:
+            planner = Planner(Vehicle())
+            try:
+                with pytest.raises(SiteError, match="Nowhere"):
+                    await planner.plan({**JOB, "route": "Nowhere"})
+                with pytest.raises(PlanError, match="tool_width"):
+                    await planner.plan({**JOB, "options": {"tool_width": 1e9}})
+                with pytest.raises(InputError):
+                    await planner.plan({**JOB, "site": {"boundary": []}})
+                process = planner._process
+                assert (await planner.plan(JOB))["nodes"]
+                assert planner._process is process
+            finally:
+                await planner.close()
+
+        asyncio.run(ask())
+
+    def test_a_killed_process_is_replaced(self) -> None:
+        async def ask() -> None:
+            planner = Planner(Vehicle())
+            try:
+                await planner.warm_up()
+                assert planner._process is not None
+                first = planner._process.pid
+                waiting = asyncio.create_task(planner.plan(JOB))
+                await asyncio.sleep(0)
+                os.kill(first, signal.SIGKILL)
+                with pytest.raises(BusyError):
+                    await waiting
+                assert (await planner.plan(JOB))["path"]
+                assert planner._process.pid != first
+            finally:
+                await planner.close()
+
+        asyncio.run(ask())
+
+    def test_a_plan_that_takes_too_long(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("polepilot.server.planner.TIMEOUT", 0.05)
+
+        async def ask() -> None:
+            planner = Planner(Vehicle())
+            try:
+                with pytest.raises(BusyError, match="was not ready"):
+                    await planner.plan(JOB)
+                monkeypatch.setattr("polepilot.server.planner.TIMEOUT", 60)
+                assert (await planner.plan(JOB))["path"]
+            finally:
+                await planner.close()
+
+        asyncio.run(ask())

@@ -38,7 +38,8 @@ class Host:
         end = self.world.now + seconds
         while self.world.now < end - 1e-9:
             now = self.world.now
-            self.link.receive(self.world.link.read(), now)
+            for chunk in self.world.link.read():
+                self.link.receive(chunk.data, chunk.stamp)
             if self.link.ready and not self.link.armed:
                 self.link.arm()
             self.link.drive(left, right, steering)
@@ -81,9 +82,13 @@ def test_unplugged() -> None:
         world.link.write(b"\0")
     with pytest.raises(CameraError):
         world.camera.read()
+    before = world.link.generation
     world.link.plugged = True
+    assert world.link.generation == before + 1
     world.advance(0.1)
-    assert world.link.read()
+    chunks = world.link.read()
+    assert chunks
+    assert all(0 < chunk.stamp <= 0.1 for chunk in chunks)
 
 
 def test_proximity_sees_walls_poles_and_people() -> None:

@@ -16,7 +16,7 @@ from polepilot.core.vision.measure import bearing_of, half_width_of, range_of
 from polepilot.core.vision.straight import Column, rough_code, straighten
 from polepilot.core.vision.strips import Strip, find_strips
 
-RANGE_FLOOR = 0.0006
+RANGE_FLOOR = 0.0009
 """Share of the range that is uncertain besides what the fit knows: blur that is not Gaussian,
 grey levels that are not quite sRGB, a camera that is not quite level."""
 MOST_NOISE = 0.2

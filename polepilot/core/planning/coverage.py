@@ -74,7 +74,7 @@ def plan_scan(
     report(0.1, "loops")
     strokes = _strokes(site, space, options, target, whole=area is None)
     if not strokes:
-        raise PlanError("nothing of the area to scan can be reached from the start.")
+        strokes = [_least_stroke(space)]
     report(0.3, "order")
     runs = ordered_runs(
         strokes, space.start.position, space, options.order, reach=options.tool_width
@@ -100,6 +100,22 @@ def plan_scan(
         area=target,
         notes=tuple(notes),
         runtime=time.perf_counter() - began,
+    )
+
+
+def _least_stroke(space: FreeSpace) -> Stroke:
+    """Where there is hardly room to move: the longest straight line that was found in it."""
+    x, y = space.start.position
+    corners = np.asarray(space.polygon.exterior.coords, dtype=float)[:, :2]
+    lines = [np.array([[x, y], corner]) for corner in corners]
+    return Stroke(
+        max(
+            (line for line in lines if space.holds_points(line)),
+            key=lambda line: float(np.hypot(*(line[1] - line[0]))),
+            default=np.array([[x, y], [x, y]]),
+        ),
+        False,
+        -1,
     )
 
 
@@ -251,7 +267,7 @@ def _driven_path(
         heading = math.atan2(aim[1] - start.y, aim[0] - start.x)
     driver = Driver(space, options.min_turn_radius, Pose2D(start.x, start.y, heading))
     recorder = _Recorder()
-    left_out = _drive(driver, runs, recorder, options)
+    _drive(driver, runs, recorder, options)
     for _ in range(2):
         path, _ = driver.track.arrays()
         missed = target.difference(swept_shape(path, options.tool_width))
@@ -261,12 +277,13 @@ def _driven_path(
             break
         pose = driver.track.pose
         _drive(driver, _nearest_first(more, pose.position), recorder, options)
-    if left_out > 0.5:
-        notes.append(
-            f"{left_out:.1f} m of the loops cannot be driven with a turning radius of "
-            f"{options.min_turn_radius:g} m and were left out."
-        )
     path, gear = driver.track.arrays()
+    left = target.difference(swept_shape(path, options.tool_width)).area
+    if left > 0.02 * target.area:
+        notes.append(
+            f"{left:.2f} m² cannot be swept with a turning radius of "
+            f"{options.min_turn_radius:g} m and a clearance of {options.clearance:g} m."
+        )
     if len(path) < 2:
         raise PlanError(
             f"the robot cannot move from the start with a turning radius of "
@@ -275,9 +292,8 @@ def _driven_path(
     return path, gear, tuple(recorder.parts)
 
 
-def _drive(driver: Driver, runs: list[Run], recorder: _Recorder, options: PlanOptions) -> float:
-    """Drives the runs; returns the length that could not be driven, metres."""
-    left_out = 0.0
+def _drive(driver: Driver, runs: list[Run], recorder: _Recorder, options: PlanOptions) -> None:
+    """Drives the runs; leaves out what cannot be reached or followed."""
     for run in runs:
         points = run.points
         here = driver.track.pose.position
@@ -285,13 +301,11 @@ def _drive(driver: Driver, runs: list[Run], recorder: _Recorder, options: PlanOp
         place = (float(points[0, 0]), float(points[0, 1]))
         if not driver.connect(place, math.atan2(step[1], step[0])):
             recorder.close("link", driver.track.last)
-            left_out += float(np.hypot(*np.diff(points, axis=0).T).sum())
             continue
         near = math.dist(here, place) <= 1.6 * options.tool_width
         recorder.close("bridge" if near else "link", driver.track.last)
-        left_out += driver.follow(points)
+        driver.follow(points)
         recorder.close("loop" if run.stroke.closed else "cleanup", driver.track.last)
-    return left_out
 
 
 def _nearest_first(strokes: list[Stroke], here: tuple[float, float]) -> list[Run]:

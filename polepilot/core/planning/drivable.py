@@ -40,6 +40,12 @@ _RADIUS_MARGIN = 1.02
 """Arcs are this much wider than asked for, so that their chords keep the radius."""
 _PLAIN = math.radians(3.0)
 """A turn below this is left as it is where its legs are long enough."""
+_CHORD = 0.12
+"""What is longer than this is no chord of an arc, metres."""
+_ARC = math.radians(5.0)
+_SHORT = 0.15
+"""A leg shorter than this is not worth a manoeuvre of its own, metres."""
+_MOST_TRIES = 6
 _BACK_OUT = (0.25, 0.5, 0.8, 1.2, 1.8, 2.6, 3.8, 5.5, 8.0)
 """How far to back out along the track where nothing fits, metres."""
 
@@ -105,20 +111,21 @@ class Driver:
         self._space = space
         self._radius = radius * _RADIUS_MARGIN
         self.track = Track(pose)
+        self._reserve = 0.0
+        """How much of the leg after a corner left as it is must stay straight, metres."""
 
-    def follow(self, points: Points, cut: float = CUT) -> float:
+    def follow(self, points: Points, cut: float = CUT) -> None:
         """Drives along ``points``, on whose first leg the track already stands.
 
-        Returns the length that had to be left out, metres.
+        What does not fit is left out.
         """
         points = _tidy(points)
-        left_out = 0.0
         index = 1
         while index < len(points):
             corner = points[index]
             if index == len(points) - 1:
                 self._straight_to(corner)
-                return left_out
+                return
             after = points[index + 1] - corner
             heading = math.atan2(after[1], after[0])
             if self._round(points, index, heading, cut):
@@ -128,10 +135,8 @@ class Driver:
             self._straight_to(corner)
             resumed = self._resume(points, index)
             if resumed is None:
-                return left_out + _length(points[index:])
-            skipped, index = resumed
-            left_out += skipped
-        return left_out
+                return
+            index = resumed
 
     def head_for(self, place: geometry.Point) -> bool:
         """Goes to ``place``, looking wherever: one curve and straight on, or what is cheaper.
@@ -286,6 +291,7 @@ class Driver:
         if abs(turn) < _PLAIN and abs(turn) * self._radius < 0.7 * min(max(before, 0.0), after):
             self._straight_to(corner)
             self.track.pose = Pose2D(*self.track.pose.position, heading)
+            self._reserve = abs(turn) * self._radius
             return True
         room = after
         if index + 2 < len(points):
@@ -298,7 +304,7 @@ class Driver:
                 room = after * mine / max(mine + theirs, 1e-9)
         tangent = self._radius * math.tan(min(abs(turn), 3.1) / 2)
         width = self._radius * (1 / math.cos(min(abs(turn), 3.1) / 2) - 1)
-        if width <= cut and tangent <= min(before, room) + 1e-9:
+        if width <= cut and tangent <= min(before - self._reserve, room) + 1e-9:
             arc: Curve = (("L" if turn > 0 else "R", abs(turn) * self._radius),)
             whole = _joined((("S", before - tangent), *arc))
             if self._fits(self.track.pose, whole):
@@ -324,7 +330,9 @@ class Driver:
         options = [
             way
             for way in _turns(round(turn, 9), round(self._radius, 9))
-            if -way.lead <= room_before + 1e-9 and way.stop <= after + 1e-9
+            if -way.lead <= room_before + 1e-9
+            and way.stop <= after + 1e-9
+            and (way.visit or not 0 <= before + way.lead < self._reserve)
         ]
         if math.isinf(cut):
             options.sort(key=lambda way: way.cost - 20 * min(way.cut, 0.5) ** 2)
@@ -338,23 +346,35 @@ class Driver:
                 return True
         return False
 
-    def _resume(self, points: Points, index: int) -> tuple[float, int] | None:
-        """Gets back onto ``points`` from the corner ``index`` or later; what was skipped, where."""
-        skipped = 0.0
-        for leg in range(index, min(len(points) - 1, index + 12)):
+    def _resume(self, points: Points, index: int) -> int | None:
+        """Gets back onto ``points`` at the corner ``index`` or later; which corner comes next.
+
+        Where a leg cannot be entered forward, it is driven backward.
+        """
+        tries = 0
+        for leg in range(index, len(points) - 1):
             step = points[leg + 1] - points[leg]
             length = float(np.hypot(*step))
+            if length < _SHORT and leg + 2 < len(points):
+                continue
             heading = math.atan2(step[1], step[0])
-            for share in (0.0, 0.5):
-                place = points[leg] + share * step
-                there = (float(place[0]), float(place[1]))
-                if self.connect(there, heading, back_out=leg == index or share == 0.0):
-                    return skipped + share * length, leg + 1
-            skipped += length
+            there = (float(points[leg, 0]), float(points[leg, 1]))
+            tries += 1
+            if self._connect_here(there, heading):
+                return leg + 1
+            if self._connect_here(there, wrap_angle(heading + math.pi)):
+                self._append((("S", -length),))
+                if leg + 1 == len(points) - 1:
+                    return len(points)
+                continue
+            if self.connect(there, heading):
+                return leg + 1
+            if tries >= _MOST_TRIES:
+                break
         return None
 
     def _back_out(self, distance: float) -> bool:
-        """Drives back on its own track; False where the track is too short."""
+        """Drives back on its own track, in arcs to the next of its points; False: too short."""
         points, gears = self.track.arrays()
         taken: list[Points] = [points[-1]]
         back: list[int] = []
@@ -366,9 +386,14 @@ class Driver:
             step = float(np.hypot(*(b - a)))
             if step > 1e-9:
                 gear = -int(gears[index])
-                forward = (b - a) * gear
-                heading = math.atan2(forward[1], forward[0])
-                taken.append(a + (b - a) * min(1.0, rest / step))
+                heading = _direction((b - a) * gear)
+                part = rest / step if step > _CHORD and rest < step else 1.0
+                if part == 1.0 and index > 0 and gears[index - 1] == gears[index]:
+                    # At a vertex of an arc the heading is between those of its two chords.
+                    beyond = _direction((points[index - 1] - b) * gear)
+                    if abs(turn := angle_between(heading, beyond)) < _PLAIN + _ARC:
+                        heading = wrap_angle(heading + turn / 2)
+                taken.append(a + (b - a) * part)
                 back.append(gear)
             rest -= step
             index -= 1
@@ -399,6 +424,7 @@ class Driver:
             straight = max(0.0, curve[-1][1]) if curve[-1][0] == "S" else 0.0
         self.track.add(points, gears, pose)
         self.track.straight = straight
+        self._reserve = 0.0
 
     def _fits(self, pose: Pose2D, curve: Curve) -> bool:
         return self._space.holds_points(sample(pose, curve, self._radius)[0])
@@ -435,6 +461,7 @@ def _turns(turn: float, radius: float) -> tuple[_Turn, ...]:
         ``visit``: to the corner before that; ``finish``: back to the corner after that.
         """
         first, last = first * legs, last * legs
+        finish = finish or last < 0  # what lies before the corner must be free as well
         start = Pose2D(first, 0.0, 0.0)
         end = Pose2D(last * math.cos(turn), last * math.sin(turn), wrap_angle(turn))
         for curve in shortest_curves(start, end, radius, CHANGE)[:8]:
@@ -463,6 +490,10 @@ def _turns(turn: float, radius: float) -> tuple[_Turn, ...]:
     for first, last in ((-0.5, 0), (-1, 0), (-0.5, -0.5), (-1.5, 1.5), (-2, 1), (-2, 2)):
         add(first, last, visit=True, finish=True)
     return tuple(sorted(ways, key=lambda way: way.cost))
+
+
+def _direction(step: Points) -> float:
+    return math.atan2(step[1], step[0])
 
 
 def _joined(curve: Curve) -> Curve:

@@ -17,6 +17,8 @@ Points = NDArray[np.float64]
 
 OVERLAP = 0.06
 """Neighbouring passes overlap by at least this share of the tool width."""
+_MOST_CUTS = 8
+"""How often a bent patch is halved before it is taken as it is."""
 _THIN = 0.1
 """A piece thinner than this share of the tool width is driven once, not around."""
 
@@ -121,9 +123,9 @@ def cleanup_strokes(
     """Passes along the patches of ``missed`` that are larger than ``smallest`` m²."""
     opened = missed.buffer(-0.004, quad_segs=2).buffer(0.004, quad_segs=2)
     strokes: list[Stroke] = []
-    pending = [patch for patch in polygons(opened) if patch.area >= smallest]
+    pending = [(patch, _MOST_CUTS) for patch in polygons(opened) if patch.area >= smallest]
     while pending:
-        patch = pending.pop()
+        patch, cuts = pending.pop()
         box = shapely.minimum_rotated_rectangle(patch)
         if not isinstance(box, Polygon):
             continue
@@ -132,11 +134,11 @@ def cleanup_strokes(
             corners = np.vstack([corners[1:], corners[1:2]])
         along, across = corners[1] - corners[0], corners[2] - corners[1]
         length, width = float(np.hypot(*along)), float(np.hypot(*across))
-        if width > 0.9 * tool_width and patch.area > smallest / 4:
+        if width > 0.9 * tool_width and cuts:
             middle = (corners[0] + corners[1]) / 2
             cut = Polygon([corners[0], middle, middle + across, corners[0] + across])
             pending += [
-                part
+                (part, cuts - 1)
                 for half in (patch.intersection(cut), patch.difference(cut))
                 for part in polygons(half)
                 if part.area > smallest / 4

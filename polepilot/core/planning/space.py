@@ -250,9 +250,9 @@ def _corner_start(home: Polygon) -> geometry.Point:
 def _reflex(polygon: Polygon) -> list[geometry.Point]:
     """Vertices of a polygon at which its inside has more than half a turn."""
     found: list[geometry.Point] = []
-    for ring in (polygon.exterior, *polygon.interiors):
+    for index, ring in enumerate((polygon.exterior, *polygon.interiors)):
         points = np.asarray(ring.coords)[:-1]
-        if (ring is polygon.exterior) != ring.is_ccw:
+        if (index == 0) != ring.is_ccw:
             points = points[::-1]  # now the inside is on the left everywhere
         before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
         turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]

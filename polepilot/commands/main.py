@@ -5,8 +5,14 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
+
+# Matrices and pictures are small here: more threads cost a netbook more than they give. Libraries
+# read these when they are imported, which the commands do later.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OPENCV_FOR_THREADS_NUM", "1")
 
 import typer
 from typer.exceptions import TyperException

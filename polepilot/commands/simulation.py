@@ -148,6 +148,7 @@ class Simulation:
             seed=seed,
             start=_start_pose(site, plan),
             disturbances=disturbances,
+            full_speed=settings.calibration.full_speed_left,
         )
         lens = settings.model.camera
         sensor: SensorPort = world.sensor

@@ -111,6 +111,10 @@ class Mission:
         command = self._avoidance.update(now, dt, estimate, proximity, self._tracker)
         return Step(command, self._avoidance.target or self._tracker.target, self._avoidance.reason)
 
+    def blocked_for(self, now: float) -> float:
+        """Seconds that an obstacle has kept it standing."""
+        return self._avoidance.blocked_for(now)
+
     def forget_obstacles(self) -> None:
         """The pose was found anew: what was remembered about obstacles hangs on the old one."""
         self._avoidance.reset()

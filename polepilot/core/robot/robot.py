@@ -35,18 +35,31 @@ STANDING_AFTER = 0.4
 """Seconds without a turning wheel after which the robot counts as standing."""
 SIGHTING_PATIENCE = 0.3
 """How long a picture waits for the pan angle of its moment, seconds."""
+ARMING_PATIENCE = 2.0
+"""Seconds until a board that does not arm pauses the mission."""
+BLOCKED_PATIENCE = 30.0
+"""Seconds of standing before an obstacle; then it takes a person to go on, for what is behind the
+robot is remembered only so long."""
 START_TOLERANCE = 0.5
 """How far from the start of its plan a mission may begin, metres."""
 EVENTS_SHOWN = 20
 
 _LEVELS: dict[str, Level] = {
-    "degraded": "warning",
     "lost": "fault",
     "landmark_moved": "warning",
     "landmark_misread": "warning",
     "landmark_unknown": "warning",
 }
 """How bad the localizer's events are; the others are for information."""
+
+_DISARMED: dict[LinkState, str] = {
+    LinkState.CLOSED: "Stopped: the line to the microcontroller is gone. Plug it in, then Resume.",
+    LinkState.CONNECTING: "Stopped: the microcontroller does not answer. Check its power, Resume.",
+    LinkState.IDLE: "Stopped: the microcontroller is not armed. Resume arms it.",
+    LinkState.LINK_LOST: "Stopped: the microcontroller missed the computer for a moment. Resume.",
+    LinkState.ESTOP: "Stopped: the button on the robot is pressed.",
+}
+"""Why a mission is paused when the board is no longer armed."""
 
 Ranges = tuple[float | None, float | None, float | None]
 
@@ -89,6 +102,9 @@ class Robot:
         self._mission: Mission | None = None
         self._paused: str | None = None
         self._was_fixed = False
+        self._armed = False
+        """Since somebody asked for it last."""
+        self._asked = 0.0
 
         self._generation = link.generation
         self._now = 0.0
@@ -157,7 +173,7 @@ class Robot:
                 or the plan starts elsewhere. The recorder stays the caller's then.
         """
         site = self._startable(plan)
-        self._host.arm()
+        self._arm()
         self._mission = Mission(run_id, plan, site, self.settings.model, recorder, self._now)
         self._paused = None
         recorder.begin(self._now, site, plan)
@@ -182,7 +198,7 @@ class Robot:
             RefusedError: nothing is under way, a latched stop, or no link.
         """
         self._require_mission()
-        self._host.arm()
+        self._arm()
         self._paused = None
         self._say("mission_resumed", "info", "Going on.")
 
@@ -328,8 +344,7 @@ class Robot:
             self._was_fixed = True
             mission.observe(estimate.pose)
         self._target = mission.target
-        if self._paused is None and self._host.state is LinkState.LINK_LOST:
-            self.pause("Stopped: the microcontroller missed the computer. Check the cable, Resume.")
+        self._watch_board(now)
         if self._paused is not None or self._host.state is not LinkState.ARMED:
             return STAND
         if estimate is None or estimate.status in (Status.FIXING, Status.LOST):
@@ -339,12 +354,23 @@ class Robot:
         if mission.done:
             self._finish("done", "The whole path was driven.")
             return STAND
+        if mission.blocked_for(now) > BLOCKED_PATIENCE:
+            self.pause(f"{step.hold} Clear the way, then Resume.")
+            return STAND
         if mission.off_route:
             self.pause(
                 f"Stopped: {mission.off_route_reason}. End the run, then plan again from here."
             )
             return STAND
         return step.command
+
+    def _watch_board(self, now: float) -> None:
+        """Whatever ends the arming ends the drive: it takes a person to go on."""
+        state = self._host.state
+        if state is LinkState.ARMED:
+            self._armed = True
+        elif self._paused is None and (self._armed or now - self._asked > ARMING_PATIENCE):
+            self.pause(_DISARMED[state])
 
     def _act(self, now: float, wanted: DriveCommand) -> None:
         """The supervisor has the last word; then bytes go out."""
@@ -474,6 +500,11 @@ class Robot:
                     code="elsewhere",
                 )
         return site
+
+    def _arm(self) -> None:
+        self._host.arm()
+        self._armed = False
+        self._asked = self._now
 
     def _require_mission(self) -> Mission:
         if self._mission is None:

@@ -70,4 +70,5 @@ def to_range_bearing(detection: Detection, stamp: float, pan: float) -> RangeBea
         bearing=wrap_angle(pan + detection.bearing),
         range_sigma=detection.range_sigma,
         bearing_sigma=detection.bearing_sigma,
+        pan=pan,
     )

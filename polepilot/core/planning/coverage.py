@@ -237,7 +237,7 @@ def _plain_path(
                 continue
             blocks.append(np.array(way[1:]))
             count += len(way) - 1
-            recorder.close(_connection(way, options), count - 1)
+            recorder.close(_connection(way, options) if recorder.parts else "link", count - 1)
         blocks.append(run.points[1:])
         count += len(run.points) - 1
         recorder.close("loop" if run.stroke.closed else "cleanup", count - 1)
@@ -302,7 +302,7 @@ def _drive(driver: Driver, runs: list[Run], recorder: _Recorder, options: PlanOp
         if not driver.connect(place, math.atan2(step[1], step[0])):
             recorder.close("link", driver.track.last)
             continue
-        near = math.dist(here, place) <= 1.6 * options.tool_width
+        near = bool(recorder.parts) and math.dist(here, place) <= 1.6 * options.tool_width
         recorder.close("bridge" if near else "link", driver.track.last)
         driver.follow(points)
         recorder.close("loop" if run.stroke.closed else "cleanup", driver.track.last)

@@ -43,10 +43,12 @@ _PLAIN = math.radians(3.0)
 _CHORD = 0.12
 """What is longer than this is no chord of an arc, metres."""
 _ARC = math.radians(5.0)
+_MOST_TURNS = 80
+"""So many ways round one corner are tried, the cheapest first."""
 _SHORT = 0.15
 """A leg shorter than this is not worth a manoeuvre of its own, metres."""
 _MOST_TRIES = 6
-_BACK_OUT = (0.25, 0.5, 0.8, 1.2, 1.8, 2.6, 3.8, 5.5, 8.0)
+_BACK_OUT = (0.25, 0.5, 0.8, 1.2, 1.8, 2.6, 3.8, 5.5, 8.0, 12.0, 20.0, 40.0)
 """How far to back out along the track where nothing fits, metres."""
 
 
@@ -64,6 +66,8 @@ class _Turn:
     """Where on the way out it ends; negative: before the corner."""
     curve: Curve
     """From ``lead`` to ``stop``."""
+    points: Points
+    """The curve's points, M x 2, from the corner on where that is visited."""
 
     def after(self, before: float) -> Curve:
         """The whole curve for a corner that lies ``before`` metres ahead."""
@@ -338,10 +342,14 @@ class Driver:
             options.sort(key=lambda way: way.cost - 20 * min(way.cut, 0.5) ** 2)
         else:
             options.sort(key=lambda way: (way.cut > cut, way.cost))
-        for way in options:
-            whole = way.after(before)
-            if self._fits(pose, whole):
-                self._append(whole)
+        cos, sin = math.cos(pose.heading), math.sin(pose.heading)
+        turned = np.array([[cos, sin], [-sin, cos]])
+        start = np.array(pose.position)
+        corner_here = start + before * turned[0]
+        for way in options[:_MOST_TURNS]:
+            points = np.vstack([start, way.points @ turned + corner_here])
+            if self._space.holds_points(points):
+                self._append(way.after(before))
                 self.track.pose = Pose2D(*self.track.pose.position, heading)
                 return True
         return False
@@ -464,7 +472,7 @@ def _turns(turn: float, radius: float) -> tuple[_Turn, ...]:
         finish = finish or last < 0  # what lies before the corner must be free as well
         start = Pose2D(first, 0.0, 0.0)
         end = Pose2D(last * math.cos(turn), last * math.sin(turn), wrap_angle(turn))
-        for curve in shortest_curves(start, end, radius, CHANGE)[:8]:
+        for curve in shortest_curves(start, end, radius, CHANGE)[:4]:
             checks: list[Points] = []
             if not visit and first < 0:
                 checks += [np.array([first * share, 0.0]) for share in (0.0, 0.25, 0.5, 0.75)]
@@ -476,7 +484,10 @@ def _turns(turn: float, radius: float) -> tuple[_Turn, ...]:
                 cut = float(np.max(shapely.distance(line, shapely.points(np.array(checks)))))
             whole: Curve = (*curve, ("S", -last)) if finish else curve
             stop = 0.0 if finish else last
-            way = _Turn(0.0, cut, first, visit, stop, _joined(whole))
+            begin = Pose2D(0.0, 0.0, 0.0) if visit else start
+            driven = (("S", first), *whole) if visit else whole
+            points = sample(begin, _joined(driven), radius)[0]
+            way = _Turn(0.0, cut, first, visit, stop, _joined(whole), points)
             cost = _cost(way.after(10.0)) - 10.0 - stop + 20 * min(cut, 0.5) ** 2
             ways.append(replace(way, cost=cost))
 

@@ -1,0 +1,150 @@
+"""Scan plans, judged from first principles: inside, clear, drivable, complete, the same twice."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from core.planning import judge, maps
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import MultiPolygon, Point, Polygon
+
+from polepilot.core.errors import PlanError, SiteError
+from polepilot.core.plan import Plan
+from polepilot.core.planning.coverage import plan_scan
+from polepilot.core.planning.options import PlanOptions
+from polepilot.core.site import Site, Start
+
+SHAPES = ["room", "slot", "ell", "comb", "neck", "office", "disc", "triangle"]
+
+
+def check(plan: Plan, site: Site, radius: float) -> None:
+    """What every scan plan must be."""
+    assert judge.clearance_of(plan, site) >= plan.clearance - 0.001
+    assert np.isfinite(plan.path).all()
+    assert plan.parts[0].first == 0
+    assert plan.parts[-1].last == len(plan.path) - 1
+    assert set(plan.gear.tolist()) <= {1, -1}
+    if radius > 0:
+        assert judge.sharpest(plan) >= 0.98 * radius
+    else:
+        assert (plan.gear == 1).all()
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.36, 0.6])
+@pytest.mark.parametrize("name", SHAPES)
+def test_shapes_are_covered(name: str, radius: float) -> None:
+    site = maps.NAMED[name]()
+    plan = plan_scan(site, PlanOptions(min_turn_radius=radius))
+    check(plan, site, radius)
+    covered = judge.coverage(plan, site)
+    assert covered >= 0.98
+    assert plan.predicted.coverage == pytest.approx(covered, abs=0.003)
+    if radius == 0 and name != "slot":
+        assert plan.predicted.length <= 1.45 * plan.area.area / plan.tool_width
+
+
+@settings(deadline=None, max_examples=12)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.36, 0.6]))
+def test_random_maps(seed: int, radius: float) -> None:
+    try:
+        site = maps.random_site(np.random.default_rng(seed))
+        plan = plan_scan(site, PlanOptions(min_turn_radius=radius))
+    except (SiteError, PlanError):
+        return
+    check(plan, site, radius)
+    assert plan.predicted.coverage == pytest.approx(judge.coverage(plan, site), abs=0.006)
+    if radius == 0 and plan.area.area > 0.5:
+        assert plan.predicted.coverage >= 0.97
+
+
+def test_the_path_begins_at_the_start() -> None:
+    site = maps.NAMED["room"]()
+    for start in (Start(1.0, 1.0), Start(2.0, 3.0, 2.0)):
+        for radius in (0.0, 0.6):
+            plan = plan_scan(site, PlanOptions(min_turn_radius=radius, start=start))
+            assert plan.path[0] == pytest.approx(start.position)
+    moves = plan.path[1] - plan.path[0]
+    heading = np.arctan2(*(moves[::-1] * plan.gear[0]))
+    assert heading == pytest.approx(2.0, abs=0.05)
+
+
+def test_a_start_too_near_to_a_wall() -> None:
+    site = maps.NAMED["room"]()
+    plan = plan_scan(site, PlanOptions(start=Start(0.15, 2.0)))
+    assert plan.path[0] == pytest.approx((0.2, 2.0), abs=0.001)
+    assert any("begins 5.0 cm away" in note for note in plan.notes)
+    with pytest.raises(PlanError, match="does not fit at the start"):
+        plan_scan(site, PlanOptions(start=Start(0.02, 2.0)))
+    with pytest.raises(PlanError, match="not on the floor"):
+        plan_scan(site, PlanOptions(start=Start(9.0, 2.0)))
+
+
+def test_what_cannot_be_reached_is_said_with_the_reason() -> None:
+    site = maps.office()
+    plan = plan_scan(site, PlanOptions(min_turn_radius=0))
+    (piece,) = plan.unreachable
+    assert piece.reason == "behind a passage of 0.35 m, the robot needs 0.40 m"
+    room = Polygon(piece.polygon)
+    # The room behind the 35 cm door, and of its wall not more than the door lets in.
+    assert room.contains(Polygon([(4.1, 0.1), (7.9, 0.1), (7.9, 2.7), (4.1, 2.7)]))
+    assert room.area == pytest.approx(12.0, abs=0.2)
+
+
+def test_a_fence_encloses() -> None:
+    fence = [[1, 1], [3, 1], [3, 3], [1, 3], [1, 1]]
+    site = maps.site(maps.box(0, 0, 6, 4), walls=[fence], start=[4, 2])
+    plan = plan_scan(site, PlanOptions(min_turn_radius=0))
+    assert [piece.reason for piece in plan.unreachable] == ["enclosed: no opening leads there"]
+
+
+def test_free_poles_are_passed_at_the_clearance() -> None:
+    site = maps.site(maps.box(0, 0, 5, 4), landmarks=[{"id": 1, "x": 2.5, "y": 2}])
+    for radius in (0.0, 0.6):
+        plan = plan_scan(site, PlanOptions(min_turn_radius=radius))
+        steps = np.stack([plan.path[:-1], plan.path[1:]], axis=1)
+        assert min(Point(2.5, 2).distance(judge.LineString(s)) for s in steps) >= 0.199
+
+
+def test_missed_patches_are_planned_alone() -> None:
+    site = maps.NAMED["room"]()
+    patches = MultiPolygon(
+        [Point(1, 1).buffer(0.15), Polygon([(3, 2), (4.5, 2), (4.5, 3), (3, 3)])]
+    )
+    start = Start(2.5, 0.5, 1.0)
+    for radius in (0.0, 0.36):
+        plan = plan_scan(site, PlanOptions(min_turn_radius=radius, start=start), patches)
+        check(plan, site, radius)
+        assert plan.area.area == pytest.approx(patches.area, rel=0.01)
+        assert plan.predicted.coverage >= 0.97
+        assert plan.path[0] == pytest.approx(start.position)
+        assert plan.predicted.length < 40
+
+
+def test_orders() -> None:
+    site = maps.NAMED["neck"]()
+    short = plan_scan(site, PlanOptions(min_turn_radius=0))
+    paper = plan_scan(site, PlanOptions(min_turn_radius=0, order="paper"))
+    assert short.predicted.length <= paper.predicted.length
+    kinds = [part.kind for part in paper.parts]
+    assert kinds[0] == "link"
+    # A loop of the paper's order is finished in one go: it ends where it begins.
+    for part in paper.parts:
+        if part.kind == "loop":
+            assert paper.path[part.first] == pytest.approx(paper.path[part.last], abs=1e-6)
+
+
+def test_the_same_twice() -> None:
+    site = maps.office()
+    first, second = (plan_scan(site, PlanOptions()) for _ in range(2))
+    assert np.array_equal(first.path, second.path)
+    assert first.parts == second.parts
+
+
+def test_a_robot_that_fits_nowhere() -> None:
+    with pytest.raises(PlanError, match=r"passages of 0\.4 m"):
+        plan_scan(maps.site(maps.box(0, 0, 5, 0.3)), PlanOptions())
+    plan = plan_scan(maps.NAMED["tight"](), PlanOptions())
+    assert plan.predicted.coverage > 0.9
+    with pytest.raises(PlanError, match="too large"):
+        plan_scan(maps.site(maps.box(0, 0, 9000, 9000)), PlanOptions())

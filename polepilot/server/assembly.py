@@ -19,9 +19,9 @@ from polepilot.core.sim.clock import PacedClock
 from polepilot.core.sim.obstacle import Obstacle
 from polepilot.core.sim.world import World, start_of
 from polepilot.core.site import Site, parse_site
-from polepilot.core.vehicle import Camera
 from polepilot.core.vision.capture import CameraCapture
 from polepilot.core.vision.detector import LandmarkDetector
+from polepilot.core.vision.paper import PaperDetector
 from polepilot.server.clock import MonotonicClock
 from polepilot.server.eyes import BackgroundSensor
 from polepilot.server.missions import last_site
@@ -85,7 +85,7 @@ def assemble(settings: Settings, site: Site) -> Assembly:
         clock=clock.now,
     )
     link = SerialPort(address, settings.link.baud_rate, clock.now)
-    sensor = BackgroundSensor(_eye(camera, settings.model.camera))
+    sensor = BackgroundSensor(_eye(camera, settings))
     return Assembly(Robot(settings.robot, sensor, link), clock, None)
 
 
@@ -98,13 +98,15 @@ def _simulated(settings: Settings, site: Site) -> Assembly:
         disturbances=settings.disturbances(np.random.default_rng(seed)),
     )
     rendered = settings.simulation.sensing == "rendered"
-    sensor = BackgroundSensor(_eye(world.camera, settings.model.camera)) if rendered else None
+    sensor = BackgroundSensor(_eye(world.camera, settings)) if rendered else None
     robot = Robot(settings.robot, world.sensor if sensor is None else sensor, world.link)
     return Assembly(robot, PacedClock(world), WorldTwin(world))
 
 
-def _eye(camera: CameraPort, lens: Camera) -> Eye:
-    return Eye(camera, lambda kinds: LandmarkDetector(lens, kinds))
+def _eye(camera: CameraPort, settings: Settings) -> Eye:
+    lens = settings.model.camera
+    kind = PaperDetector if settings.landmark.detector == "paper" else LandmarkDetector
+    return Eye(camera, lambda kinds: kind(lens, kinds))
 
 
 def open_services(settings: Settings, host: str, port: int, data: Path | None) -> Services:

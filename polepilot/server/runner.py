@@ -201,8 +201,9 @@ class Runner:
             while not self._stopping.is_set() and failures < MOST_FAILURES:
                 self._clock.wait_until(due)
                 now = self._clock.now()
+                began = time.perf_counter()
                 failures = 0 if self._tick(now) else failures + 1
-                self._meter.add(now, now - due, self._clock.now() - now)
+                self._meter.add(now, now - due, time.perf_counter() - began)
                 # A machine that was asleep for a while does not make up for lost ticks.
                 due = due + self._period if now - due < 5 * self._period else now + self._period
         finally:

@@ -101,4 +101,5 @@ def serve(tmp_path: Path) -> Iterator[Callable[..., Running]]:
         return running[-1]
 
     yield start
-    assert all([one.stop() for one in running])
+    ended = [one.stop() for one in running]
+    assert all(ended)

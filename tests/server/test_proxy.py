@@ -13,7 +13,8 @@ import httpx
 import pytest
 from server.conftest import Running
 from websockets.asyncio.client import connect
-from websockets.asyncio.server import ServerConnection, serve as serve_sockets
+from websockets.asyncio.server import ServerConnection
+from websockets.asyncio.server import serve as serve_sockets
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
@@ -49,7 +50,7 @@ class FakePanel:
     def set_plan(self, plan: Any) -> None:
         pass
 
-    def update(self, snapshot: Any, truth: Any, image: Any) -> None:
+    def update(self, *_: Any) -> None:
         self.updates += 1
 
     async def _listen(self) -> None:

@@ -249,7 +249,7 @@ class TestSimulation:
 
 class TestMissions:
     def test_a_run_from_start_to_record(
-        self, client: TestClient, services: Services, robot: FakeRobot, route_plan: int
+        self, client: TestClient, robot: FakeRobot, route_plan: int
     ) -> None:
         response = client.post(f"{API}/missions", json={"plan_id": route_plan})
         assert response.status_code == 201, response.text

@@ -53,7 +53,7 @@ def test_ticks_in_one_thread_at_its_rate(runner: Runner, robot: FakeRobot) -> No
 
 def test_commands_are_done_between_ticks_in_order(runner: Runner, robot: FakeRobot) -> None:
     runner.start()
-    runner.submit(lambda r: time.sleep(0.05))
+    runner.submit(lambda _: time.sleep(0.05))
     first = runner.submit(lambda r: r.load_site(SITE))
     second = runner.submit(lambda r: r.clear())
     urgent = runner.submit(lambda r: r.stop("now"), urgent=True)
@@ -92,7 +92,7 @@ def test_a_refusal_reaches_who_asked_and_nothing_stops(runner: Runner, robot: Fa
     with pytest.raises(RefusedError, match="Nothing is under way"):
         runner.submit(lambda r: r.pause()).result(timeout=2)
     ticks = runner.ticks
-    runner.submit(lambda r: None).result(timeout=2)
+    runner.submit(lambda _: None).result(timeout=2)
     assert runner.ticks > ticks
     assert runner.failures == 0
 
@@ -107,7 +107,7 @@ def test_a_failed_tick_stops_the_wheels_and_the_loop_goes_on(
     robot.fail_with = None
     assert robot.calls[0] == "stop"
     assert "oops" in robot.reason
-    runner.submit(lambda r: None).result(timeout=2)
+    runner.submit(lambda _: None).result(timeout=2)
     assert not runner.failed
 
 
@@ -121,7 +121,7 @@ def test_a_loop_that_keeps_failing_ends(runner: Runner, robot: FakeRobot) -> Non
     assert runner.failures == MOST_FAILURES
     assert robot.calls[-1] == "shutdown"
     with pytest.raises(BusyError):
-        runner.submit(lambda r: None).result(timeout=2)
+        runner.submit(lambda _: None).result(timeout=2)
 
 
 def test_a_command_that_nobody_waits_for_any_more_is_not_done(
@@ -140,7 +140,7 @@ def test_a_command_that_nobody_waits_for_any_more_is_not_done(
 
     asyncio.run(ask())
     robot.step_takes = 0.0
-    runner.submit(lambda r: None).result(timeout=2)
+    runner.submit(lambda _: None).result(timeout=2)
     assert robot.calls == ["stop"]
 
 
@@ -148,4 +148,4 @@ def test_after_the_end_nothing_is_taken(runner: Runner) -> None:
     runner.start()
     assert runner.stop()
     with pytest.raises(BusyError, match="does not answer"):
-        runner.submit(lambda r: None).result(timeout=1)
+        runner.submit(lambda _: None).result(timeout=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import socket
 import time
@@ -80,10 +81,9 @@ def test_who_never_reads_is_dropped_and_slows_nobody(serve: Callable[..., Runnin
     assert hub.dropped == 1
     # It is cut off for good, with all that was waiting for it.
     deaf.settimeout(5)
-    with pytest.raises(ConnectionError):
+    with contextlib.suppress(ConnectionError):
         while deaf.recv(1 << 20):
             pass
-        raise ConnectionResetError
     deaf.close()
 
 
@@ -139,9 +139,10 @@ def test_ends_quickly_with_open_sockets(serve: Callable[..., Running]) -> None:
         assert await asyncio.to_thread(running.stop)
         took = time.monotonic() - began
         for one in sockets:
-            with pytest.raises(ConnectionClosed):
-                while True:
-                    await one.recv()
+            with contextlib.suppress(ConnectionClosed):
+                async with asyncio.timeout(2):
+                    while True:
+                        await one.recv()
         return took
 
     assert asyncio.run(listen()) < 2.5
@@ -158,3 +159,12 @@ def test_one_text_for_all() -> None:
     published = Published(FakeRobot().step(1.0), Surroundings(wall=0.0))
     hub: Any = Hub()
     assert hub.text_of(published) is hub.text_of(published)
+
+
+def test_a_robot_that_gives_up_ends_the_service(serve: Callable[..., Running]) -> None:
+    running = serve()
+    running.robot.fail_with = ZeroDivisionError("oops")
+    running._thread.join(5)
+    assert not running._thread.is_alive()
+    assert running.services.failed
+    assert running.robot.calls[-1] == "shutdown"

@@ -118,7 +118,7 @@ export function hint(sketch: Sketch): string {
   if (n === 0) return "Click to place the first corner.";
   if (n < fewest(sketch.kind))
     return "Click the next corner, or type a length in metres. Tab: angle.";
-  return "Enter or double-click ends. Escape takes the last corner back.";
+  return "Enter or double-click ends, Escape takes the last corner back.";
 }
 
 function number(text: string): number | null {

@@ -96,7 +96,7 @@ function paintRoute(paper: Paper, nodes: readonly Point[], name: string, chosen:
   });
   if (nodes.length > 0) {
     const [x, y] = paper.at(nodes[0]);
-    words(paper, name, [x, y + 20], { color, bold: chosen });
+    words(paper, name, [x, y - 18], { color, bold: chosen });
   }
 }
 

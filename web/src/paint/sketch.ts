@@ -76,7 +76,7 @@ export function paintHandles(paper: Paper, site: Site, at: Selection): void {
     const [x, y] = paper.at(middle(a, b));
     // Beside the edge, so that the point to drag stays free.
     const across = direction(a, b) + Math.PI / 2;
-    words(paper, length(apart), [x + 22 * Math.cos(across), y - 16 * Math.sin(across)], {
+    words(paper, length(apart), [x + 34 * Math.cos(across), y - 16 * Math.sin(across)], {
       size: 12,
     });
   }

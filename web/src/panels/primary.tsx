@@ -1,8 +1,8 @@
 /** The one thing to do next. A running mission comes first, in every place. */
 
-import { dirty, saved } from "../state/draft";
+import { saved, site } from "../state/draft";
 import { go, location } from "../state/location";
-import { outdated, plan, planning, start, startLabel } from "../state/plan";
+import { outdated, plan, planning, start, startLabel, stopWaiting, waiting } from "../state/plan";
 import { mission, pause, releaseStop, resume, snapshot, stale } from "../state/robot";
 import { Button } from "../ui/controls";
 
@@ -31,6 +31,13 @@ export function PrimaryAction() {
       </Button>
     );
   }
+  if (place === "check" && waiting.value !== null) {
+    return (
+      <Button kind="primary" onClick={stopWaiting}>
+        Do not start
+      </Button>
+    );
+  }
   if (place === "check" && plan.value) {
     return (
       <Button
@@ -43,12 +50,13 @@ export function PrimaryAction() {
     );
   }
   if (place === "draw" && saved.value) {
+    const unsaved = saved.value.id === null;
     return (
       <Button
         kind="primary"
         onClick={() => go({ place: "check", id: saved.value?.id ?? null })}
-        disabled={dirty.value && saved.value.id === null}
-        title={dirty.value && saved.value.id === null ? "Save the site first." : undefined}
+        disabled={unsaved || site.value.boundary.length === 0}
+        title={unsaved ? "Draw the boundary and save first." : undefined}
       >
         Check this site
       </Button>

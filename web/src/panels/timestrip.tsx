@@ -1,15 +1,16 @@
 /** The line at the bottom: what happens, how far it is, and on a finished run the slider. */
 
 import { counter, duration, length, percent } from "../core/format";
+import { fewest } from "../core/site";
 import { hint, type Sketch } from "../core/sketch";
-import { check } from "../state/draft";
-import { pointer, resolution, sketch } from "../state/editor";
+import { check, site } from "../state/draft";
+import { finishSketch, pointer, pressKey, resolution, sketch } from "../state/editor";
 import { location } from "../state/location";
 import { hush, notice, work } from "../state/notice";
 import { plan, planning } from "../state/plan";
 import { mission, simulationTool, snapshot, stale } from "../state/robot";
 import { moment, play, playing, run, span } from "../state/runs";
-import { IconButton } from "../ui/controls";
+import { Button, IconButton } from "../ui/controls";
 
 const BARS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500];
 
@@ -74,9 +75,29 @@ function Progress() {
 
 const noMouse = window.matchMedia("(hover: none)");
 
+/** What to do next, and for fingers what the keys would do. */
+function DrawingLine() {
+  const tool = sketch.value;
+  const text = drawingLine(tool);
+  return (
+    <>
+      <span class="line">{noMouse.matches ? text.replace("Click", "Tap") : text}</span>
+      {tool && tool.points.length > 0 && (
+        <span class="strip-buttons">
+          <IconButton icon="undo" label="Take back one corner" onClick={() => pressKey("Escape")} />
+          <Button disabled={tool.points.length < fewest(tool.kind)} onClick={finishSketch}>
+            Finish
+          </Button>
+        </span>
+      )}
+    </>
+  );
+}
+
 function drawingLine(tool: Sketch | null): string {
   const problems = check.value?.problems.length ?? 0;
   if (tool) return hint(tool);
+  if (site.value.boundary.length === 0) return "Draw the boundary first, or open a site.";
   if (problems > 0)
     return `${problems === 1 ? "One thing has" : `${problems} things have`} to be mended before the site can be driven.`;
   return noMouse.matches
@@ -96,7 +117,8 @@ export function StripLine() {
       </div>
     );
   }
-  if (said) {
+  // While somebody draws, the next step matters more than the last one.
+  if (said && !(said.level === "info" && sketch.value)) {
     return (
       <div
         class={`strip-line notice ${said.level}`}
@@ -117,7 +139,7 @@ export function StripLine() {
 function Line() {
   switch (location.value.place) {
     case "draw":
-      return <span class="line">{drawingLine(sketch.value)}</span>;
+      return <DrawingLine />;
     case "check":
       return (
         <span class="line">

@@ -14,8 +14,9 @@ import {
   planning,
   refusal,
   routeName,
+  waiting,
 } from "../state/plan";
-import { about, mission, snapshot, stale, useSite } from "../state/robot";
+import { about, mission, snapshot, stale } from "../state/robot";
 import { Button, Choice, Empty, Fact, Facts, Figure, NumberField, Section } from "../ui/controls";
 
 function Options() {
@@ -147,13 +148,15 @@ function Hindrance() {
   if (outdated.value) {
     return <p class="hint">The site was saved after this plan was made. Plan again.</p>;
   }
-  if (now.site_id !== record.site_id) {
+  if (waiting.value !== null) {
     return (
-      <div class="hint">
-        <p>The robot works on another site.</p>
-        <Button onClick={() => void useSite(record.site_id)}>Load this site on the robot</Button>
-      </div>
+      <p class="hint" role="status">
+        Starts as soon as the robot has found its place. {now.reason}
+      </p>
     );
+  }
+  if (now.site_id !== record.site_id) {
+    return <p class="hint">The robot works on another site; starting loads this one.</p>;
   }
   if (now.state === "fixing" || now.state === "lost")
     return <p class="hint">{now.reason || "The robot looks for its place."}</p>;

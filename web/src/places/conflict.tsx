@@ -21,7 +21,7 @@ export function Conflict() {
           Keep mine as a copy
         </Button>
         <Button onClick={takeTheirs}>Take theirs</Button>
-        <Button kind="quiet" onClick={close}>
+        <Button kind="subtle" onClick={close}>
           Decide later
         </Button>
       </div>

@@ -5,8 +5,8 @@ import * as api from "../api/client";
 import type { PlanRecord, PlanRequest } from "../api/types";
 import { dirty, save, saved, site } from "./draft";
 import { go, location } from "./location";
-import { doing, say, sentenceOf } from "./notice";
-import { snapshot, useSite } from "./robot";
+import { doing, sentenceOf } from "./notice";
+import { age, snapshot, useSite } from "./robot";
 
 /** The options as typed; null: the robot's own value. */
 export const options = signal<{
@@ -35,6 +35,7 @@ export const outdated = computed(
 
 async function ask(what: string, request: PlanRequest): Promise<void> {
   planning.value = what;
+  plan.value = null;
   refusal.value = null;
   try {
     plan.value = await api.makePlan(request);
@@ -75,24 +76,70 @@ export async function planPending(runId: number, siteId: number): Promise<void> 
   await ask("Planning what was missed", { site_id: siteId, mode: "scan", pending_of: runId });
 }
 
-/** Starts the plan at hand and goes to Drive. Loads its site on the robot where that is another. */
+/** The plan that starts as soon as the robot knows its place; null: none waits. */
+export const waiting = signal<number | null>(null);
+
+/** Longer than this nobody waits who pressed a button. */
+const LONGEST_WAIT = 45_000;
+/** A robot that is silent for so many seconds does not start when it comes back. */
+const LONGEST_SILENCE = 5;
+let patience: ReturnType<typeof setTimeout> | undefined;
+
+/**
+ * Starts the plan at hand and goes to Drive. A robot that works on another site loads this one
+ * first; one that still looks for its place starts when it has found it.
+ */
 export async function start(): Promise<void> {
   const record = plan.value;
   if (!record) return;
+  refusal.value = null;
   if (snapshot.value && snapshot.value.site_id !== record.site_id) {
-    if (await useSite(record.site_id)) {
-      say("The robot works on this site now and looks for its place. Start once it is ready.");
-    }
+    if (!(await useSite(record.site_id))) return;
+  } else if (snapshot.value?.state !== "fixing") {
+    await startNow(record.id);
     return;
   }
-  refusal.value = null;
+  waiting.value = record.id;
+  clearTimeout(patience);
+  patience = setTimeout(() => {
+    if (waiting.value === null) return;
+    refusal.value = `Not started: ${snapshot.value?.reason || "the robot has not found its place."}`;
+    waiting.value = null;
+  }, LONGEST_WAIT);
+}
+
+export function stopWaiting(): void {
+  waiting.value = null;
+}
+
+async function startNow(id: number): Promise<void> {
   try {
-    await api.startMission(record.id);
+    await api.startMission(id);
     go({ place: "drive" });
   } catch (error) {
     refusal.value = sentenceOf(error);
   }
 }
+
+// Nothing starts behind anybody's back: it waits only while this plan is looked at.
+effect(() => {
+  const id = waiting.value;
+  if (id === null) return;
+  const now = snapshot.value;
+  const looked = location.value.place === "check" && plan.value?.id === id;
+  const silent = age.value === null || age.value > LONGEST_SILENCE;
+  if (!looked) {
+    waiting.value = null;
+  } else if (silent || now?.state === "stopped") {
+    waiting.value = null;
+    refusal.value = silent
+      ? "Not started: the robot cannot be reached."
+      : "Not started: the robot was stopped.";
+  } else if (now?.state === "ready" && now.site_id === plan.value?.site_id) {
+    waiting.value = null;
+    untracked(() => void startNow(id));
+  }
+});
 
 export const startLabel = computed(() => {
   const record = plan.value;

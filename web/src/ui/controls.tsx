@@ -8,7 +8,7 @@ import { Icon, type IconName } from "./icon";
 interface ButtonProps {
   children: ComponentChildren;
   onClick: () => void;
-  kind?: "primary" | "plain" | "quiet";
+  kind?: "primary" | "plain" | "subtle";
   disabled?: boolean;
   title?: string;
   icon?: IconName;

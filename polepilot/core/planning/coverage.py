@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from polepilot.core.errors import PlanError
-from polepilot.core.geometry import Pose2D
+from polepilot.core.geometry import Pose2D, wrap_angle
 from polepilot.core.plan import PartKind, Plan, PlanPart
 from polepilot.core.planning.drivable import Driver
 from polepilot.core.planning.offset import (
@@ -259,15 +259,20 @@ def _driven_path(
     notes: list[str],
 ) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
     """Followable by a steered wheel; what its curves miss is visited at the end."""
-    start = space.start
-    heading = start.heading
-    if heading is None:
-        first = runs[0].points
-        aim = first[0] if math.dist(first[0], start.position) > 0.05 else first[1]
-        heading = math.atan2(aim[1] - start.y, aim[0] - start.x)
-    driver = Driver(space, options.min_turn_radius, Pose2D(start.x, start.y, heading))
-    recorder = _Recorder()
-    _drive(driver, runs, recorder, options)
+    driver, recorder, least = None, _Recorder(), math.inf
+    for heading in _headings(space, runs):
+        trial = Driver(
+            space, options.min_turn_radius, Pose2D(space.start.x, space.start.y, heading)
+        )
+        record = _Recorder()
+        _drive(trial, runs, record, options)
+        path, _ = trial.track.arrays()
+        left = target.difference(swept_shape(path, options.tool_width)).area
+        if left < least:
+            driver, recorder, least = trial, record, left
+        if left < 0.1 * target.area:
+            break
+    assert driver is not None  # there is at least one heading
     for _ in range(2):
         path, _ = driver.track.arrays()
         missed = target.difference(swept_shape(path, options.tool_width))
@@ -290,6 +295,17 @@ def _driven_path(
             f"{options.min_turn_radius:g} m."
         )
     return path, gear, tuple(recorder.parts)
+
+
+def _headings(space: FreeSpace, runs: list[Run]) -> list[float]:
+    """The start's heading; where it has none, along the first run, then others to try."""
+    start = space.start
+    if start.heading is not None:
+        return [start.heading]
+    first = runs[0].points
+    aim = first[0] if math.dist(first[0], start.position) > 0.05 else first[1]
+    along = math.atan2(aim[1] - start.y, aim[0] - start.x)
+    return [wrap_angle(along + turn * math.pi / 2) for turn in (0, 2, 1, 3)]
 
 
 def _drive(driver: Driver, runs: list[Run], recorder: _Recorder, options: PlanOptions) -> None:

@@ -171,7 +171,7 @@ def free_space(site: Site, options: PlanOptions) -> FreeSpace:
     notes: list[str] = []
     if start is None:
         home = pieces[0]
-        x, y = _corner_start(home)
+        x, y = _default_start(home)
         start = Start(x, y)
     else:
         home, start = _at_start(pieces, floor, start, options, notes)
@@ -241,10 +241,13 @@ def _at_start(
     return home, Start(x, y, start.heading)
 
 
-def _corner_start(home: Polygon) -> geometry.Point:
-    """A place on the outline near its lower left corner: a plan for a site without a start."""
-    x, y = min(home.exterior.coords, key=lambda c: (c[0] + c[1], c[0]))[:2]
-    return (float(x), float(y))
+def _default_start(home: Polygon) -> geometry.Point:
+    """A place from which a plan for a site without a start begins well: on a long side."""
+    corners = np.asarray(home.exterior.coords, dtype=float)[:, :2]
+    sides = np.round(np.hypot(*np.diff(corners, axis=0).T), 6)
+    index = int(np.argmax(sides))
+    middle = (corners[index] + corners[index + 1]) / 2
+    return (float(middle[0]), float(middle[1]))
 
 
 def _reflex(polygon: Polygon) -> list[geometry.Point]:

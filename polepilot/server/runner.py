@@ -93,18 +93,21 @@ class Published:
 
 
 class _LoopMeter:
-    """Rate, lateness and busy share over the last ticks."""
+    """Rate, lateness and busy share over the last ticks, by the wall clock: a simulated one
+    moves in steps. A tick is late by what it begins later than a period after the one before."""
 
-    def __init__(self) -> None:
+    def __init__(self, period: float) -> None:
+        self._period = period
         self._starts: deque[float] = deque(maxlen=_WINDOW)
         self._late: deque[float] = deque(maxlen=_WINDOW)
         self._worked: deque[float] = deque(maxlen=_WINDOW)
         self._next = 0.0
         self.loop = Loop()
 
-    def add(self, start: float, late: float, worked: float) -> None:
+    def add(self, start: float, worked: float) -> None:
+        if self._starts:
+            self._late.append(max(0.0, start - self._starts[-1] - self._period))
         self._starts.append(start)
-        self._late.append(late)
         self._worked.append(worked)
         if start >= self._next and len(self._starts) > 1:
             self._next = start + 0.5
@@ -135,7 +138,7 @@ class Runner:
         self._stopping = threading.Event()
         self._stepped = threading.Event()
         self._thread = threading.Thread(target=self._run, name="robot", daemon=True)
-        self._meter = _LoopMeter()
+        self._meter = _LoopMeter(self._period)
         self._last_published = -1.0
         self.latest: Published | None = None
         self.sighting: Sighting | None = None
@@ -203,7 +206,7 @@ class Runner:
                 now = self._clock.now()
                 began = time.perf_counter()
                 failures = 0 if self._tick(now) else failures + 1
-                self._meter.add(now, now - due, time.perf_counter() - began)
+                self._meter.add(began, time.perf_counter() - began)
                 # A machine that was asleep for a while does not make up for lost ticks.
                 due = due + self._period if now - due < 5 * self._period else now + self._period
         finally:

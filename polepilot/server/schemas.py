@@ -353,7 +353,7 @@ class LoopModel(Model):
     rate: float
     """Ticks per second."""
     lateness_p99: float
-    """Seconds."""
+    """How much later than it should a tick begins, seconds, 99th percentile."""
     busy: float
     """Share of the time that the robot's thread works."""
 

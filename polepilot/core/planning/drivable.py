@@ -198,14 +198,14 @@ class Driver:
         if not back_out:
             return False
         saved = self._save()
-        gone = 0.0
         for distance in _BACK_OUT:
-            if not self._back_out(distance - gone):
-                break
-            gone = distance
+            # From the same place each time: backing out twice would lead in again.
+            enough = self._back_out(distance)
             if self._connect_here(place, heading):
                 return True
-        self._restore(saved)
+            self._restore(saved)
+            if not enough:
+                break
         return False
 
     def _connect_here(self, place: geometry.Point, heading: float | None) -> bool:
@@ -222,12 +222,11 @@ class Driver:
         if self._along_path(place, heading):
             if direct is None or self._cost_since(saved) <= direct[0]:
                 return True
-            self._restore(saved)
-        if direct is not None:
-            self._append(direct[1])
-            return True
-        self._restore(saved)
-        return False
+        self._restore(saved)  # it may have got half-way
+        if direct is None:
+            return False
+        self._append(direct[1])
+        return True
 
     def _direct(self, place: geometry.Point, heading: float) -> tuple[float, Curve] | None:
         """The cheapest curve to a pose, perhaps from some way back or by way of a point ahead."""
@@ -382,7 +381,7 @@ class Driver:
         return None
 
     def _back_out(self, distance: float) -> bool:
-        """Drives back on its own track, in arcs to the next of its points; False: too short."""
+        """Drives back on its own track, in arcs to the next of its points; False: to its start."""
         points, gears = self.track.arrays()
         taken: list[Points] = [points[-1]]
         back: list[int] = []
@@ -405,15 +404,13 @@ class Driver:
                 back.append(gear)
             rest -= step
             index -= 1
-        if rest > 1e-6:
-            return False
         self.track.add(
             np.array(taken),
             np.array(back, np.int8),
             Pose2D(float(taken[-1][0]), float(taken[-1][1]), heading),
         )
         self.track.straight = 0.0
-        return True
+        return rest <= 1e-6
 
     def _straight_to(self, corner: Points) -> None:
         """Straight to a place on the line of the present heading, forward or back."""

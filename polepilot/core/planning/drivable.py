@@ -219,9 +219,10 @@ class Driver:
             self._append(direct[1])
             return True
         saved = self._save()
-        if self._along_path(place, heading):
-            if direct is None or self._cost_since(saved) <= direct[0]:
-                return True
+        if self._along_path(place, heading) and (
+            direct is None or self._cost_since(saved) <= direct[0]
+        ):
+            return True
         self._restore(saved)  # it may have got half-way
         if direct is None:
             return False

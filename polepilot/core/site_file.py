@@ -187,10 +187,11 @@ def _separate(points: list[Point], where: Point) -> list[Point] | None:
 def signed_area(points: list[Point] | Polyline) -> float:
     """Of a ring, counter-clockwise positive, m²."""
     x0, y0 = points[0]
-    return 0.5 * sum(
+    total = sum(
         (a[0] - x0) * (b[1] - y0) - (b[0] - x0) * (a[1] - y0)
         for a, b in zip(points, (*points[1:], points[0]), strict=True)
     )
+    return 0.5 * float(total)
 
 
 def same(a: Point, b: Point) -> bool:

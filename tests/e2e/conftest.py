@@ -145,7 +145,7 @@ class Window:
     def wait_for(self, condition: str, timeout: float = 30.0) -> None:
         """Until ``condition``, a JavaScript expression on the snapshot ``s``, holds."""
         deadline = time.monotonic() + timeout
-        question = f"() => {{ const s = window.polepilot?.snapshot(); return !!s && ({condition}); }}"
+        question = f"(() => {{ const s = window.polepilot?.snapshot(); return s && {condition}; }})"
         # Asked from outside: the page's own policy forbids what wait_for_function does.
         while not self.page.evaluate(question):
             assert time.monotonic() < deadline, f"{condition}: {self.snapshot()}"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import math
 import time
+import urllib.request
+from itertools import pairwise
 from typing import Any
 
 import pytest
-
 from e2e.conftest import Service, Window
 
 pytestmark = pytest.mark.browser
@@ -105,7 +107,7 @@ def test_stop_in_the_middle_of_a_run(window: Window, service: Service) -> None:
     stopped = next(s["stamp"] for s in seen if s["state"] == "stopped")
     moving = [
         b["stamp"]
-        for a, b in zip(seen, seen[1:], strict=False)
+        for a, b in pairwise(seen)
         if math.dist((a["real"]["x"], a["real"]["y"]), (b["real"]["x"], b["real"]["y"])) > 0.002
     ]
     assert any(stamp < stopped for stamp in moving), "the robot was not driving"
@@ -129,9 +131,6 @@ def test_undo_redo_and_a_conflict_lose_nothing(window: Window, service: Service)
     # Somebody else saves first.
     site = dict(record["site"], name="Changed elsewhere")
     path = f"/sites/{record['id']}"
-    import json
-    import urllib.request
-
     request = urllib.request.Request(
         f"{service.url}/api/v1{path}",
         json.dumps(site).encode(),

@@ -8,7 +8,7 @@ from typing import Any, Literal
 from shapely import MultiPolygon
 from shapely.geometry import mapping
 
-from polepilot.core.command import DriveCommand
+from polepilot.core.command import STAND, DriveCommand
 from polepilot.core.control.avoidance import ObstacleAvoidance
 from polepilot.core.control.tracker import PathTracker
 from polepilot.core.geometry import Point, Pose2D
@@ -17,11 +17,18 @@ from polepilot.core.plan import Mode, Plan
 from polepilot.core.planning.swept import SweptArea
 from polepilot.core.robot.recorder import Recorder
 from polepilot.core.robot.snapshot import MissionStatus
+from polepilot.core.scenery import Scenery
 from polepilot.core.site import Site
 from polepilot.core.vehicle import RobotModel
 
 Outcome = Literal["done", "paused", "failed", "timeout"]
 
+CERTAINTY = 2.0
+"""So many standard deviations of the position have to fit between body and wall."""
+LEAST_GAP = 0.02
+"""Where a plan comes nearer to walls than this, it is the plan's business; metres."""
+LOOK_TIME = 15.0
+"""Seconds: two sweeps of the camera. Standing longer shows nothing new."""
 SWEEP_STEP = 0.02
 """The swept area grows by strokes of at least this length, metres."""
 JUMP = 0.5
@@ -73,6 +80,9 @@ class Mission:
         self.site = site
         self.recorder = recorder
         self._started = now
+        self._scenery = Scenery(site.segments())
+        self._body_radius = model.vehicle.body_radius
+        self._blind_since: float | None = None
         self._tracker = PathTracker(plan, model.vehicle)
         self._avoidance = ObstacleAvoidance(model.proximity, model.vehicle, site)
         self._swept = None if plan.area.is_empty else SweptArea(plan.area, plan.tool_width)
@@ -108,8 +118,26 @@ class Mission:
         proximity: tuple[float | None, float | None, float | None],
     ) -> Step:
         """The command that follows the plan from ``estimate``, round obstacles."""
+        if hold := self._too_blind(now, estimate):
+            return Step(STAND, self._tracker.target, hold)
         command = self._avoidance.update(now, dt, estimate, proximity, self._tracker)
         return Step(command, self._avoidance.target or self._tracker.target, self._avoidance.reason)
+
+    def _too_blind(self, now: float, estimate: PoseEstimate) -> str:
+        """Why it should wait for a landmark: a wall may be nearer than the pose is certain."""
+        sigma = estimate.position_sigma
+        gap = self._scenery.distance(estimate.pose.position) - self._body_radius
+        if CERTAINTY * sigma <= max(gap, LEAST_GAP):
+            self._blind_since = None
+            return ""
+        if self._blind_since is None:
+            self._blind_since = now
+        if now - self._blind_since > LOOK_TIME:
+            return ""  # nothing to be seen from here: the limits on the pose decide from now on
+        return (
+            f"Waiting for a landmark: the position is known to {100 * sigma:.0f} cm, "
+            f"and a wall is {100 * max(gap, 0.0):.0f} cm away."
+        )
 
     def blocked_for(self, now: float) -> float:
         """Seconds that an obstacle has kept it standing."""

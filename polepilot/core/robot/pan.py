@@ -75,19 +75,34 @@ class PanTrack:
 
 
 class PanSweep:
-    """Turns the camera to and fro (paper, "camera rotation"): full duty one way, then the other."""
+    """Turns the camera to and fro (paper, "camera rotation") between two angles.
+
+    As long as it is not known where landmarks are to be seen, those are the ends of the pan range.
+    """
 
     def __init__(self, minimum: float, maximum: float, duty: float, margin: float = 0.06) -> None:
-        self._low, self._high = minimum + margin, maximum - margin
+        self._ends = (minimum + margin, maximum - margin)
         self._duty = duty
         self._direction = 1.0
+        self.turns = 0
+        """How often it has turned round."""
 
-    def rate(self, angle: float | None) -> float:
-        """The duty to ask for, -1 to 1, with the camera at ``angle``; 0 while that is unknown."""
+    def rate(self, angle: float | None, between: tuple[float, float] | None = None) -> float:
+        """The duty to ask for, -1 to 1, with the camera at ``angle``; 0 while that is unknown.
+
+        ``between`` narrows the sweep to these two angles, inside the pan range.
+        """
         if angle is None:
             return 0.0
-        if angle >= self._high:
-            self._direction = -1.0
-        elif angle <= self._low:
-            self._direction = 1.0
+        low, high = self._ends
+        if between is not None:
+            low, high = max(low, between[0]), min(high, between[1])
+        wanted = self._direction
+        if angle >= high:
+            wanted = -1.0
+        elif angle <= low:
+            wanted = 1.0
+        if wanted != self._direction:
+            self._direction = wanted
+            self.turns += 1
         return self._direction * self._duty

@@ -22,11 +22,14 @@ from polepilot.core.link.protocol import HostLink, LinkState, TelemetrySample
 from polepilot.core.localization.localizer import Localizer, LocalizerSettings
 from polepilot.core.observation import PanReading, PoseEstimate, RangeBearing, Status
 from polepilot.core.plan import Plan
+from polepilot.core.robot.gaze import Gaze
 from polepilot.core.robot.mission import Mission, Outcome, RunSummary
 from polepilot.core.robot.pan import PanSweep, PanTrack
 from polepilot.core.robot.ports import LinkPort, SensorPort, Sighting
 from polepilot.core.robot.recorder import Recorder
+from polepilot.core.robot.servo import Servo
 from polepilot.core.robot.snapshot import Event, Level, LinkStatus, Measured, Snapshot, State
+from polepilot.core.scenery import Scenery
 from polepilot.core.site import Site
 from polepilot.core.vehicle import RobotModel
 from polepilot.core.vision.measure import to_range_bearing
@@ -95,10 +98,12 @@ class Robot:
         self._supervisor = Supervisor(settings.limits, settings.model.vehicle)
         pan = settings.model.pan
         self._pan = PanTrack()
+        self._servo = Servo(settings.model.vehicle.steering_rate)
         self._sweep = PanSweep(pan.minimum, pan.maximum, pan.sweep_duty)
 
         self._site: Site | None = None
         self._localizer: Localizer | None = None
+        self._gaze: Gaze | None = None
         self._mission: Mission | None = None
         self._paused: str | None = None
         self._was_fixed = False
@@ -160,6 +165,8 @@ class Robot:
             self.settings.model.camera.forward,
             self.settings.localizer,
         )
+        model = self.settings.model
+        self._gaze = Gaze(model.camera, model.pan, landmarks, Scenery(site.segments()))
         self._estimate = None
         self._was_fixed = False
         self._waiting.clear()
@@ -298,6 +305,7 @@ class Robot:
         odometry = self.settings.calibration.to_odometry(
             telemetry, sample.stamp, previous, self._host.features
         )
+        odometry = self._servo.follow(odometry)
         if odometry.speed != 0.0:
             self._last_moving = sample.stamp
         if self._localizer is not None:
@@ -383,8 +391,11 @@ class Robot:
         self._host.drive(*duty)
         latest = self._pan.latest
         rate = 0.0
-        if self._localizer is not None:
-            rate = self._sweep.rate(None if latest is None else latest.angle)
+        if self._gaze is not None:
+            between = None
+            if self._estimate is not None and self._estimate.status is Status.TRACKING:
+                between = self._gaze.between(now, self._estimate.pose, self._sweep.turns)
+            rate = self._sweep.rate(None if latest is None else latest.angle, between)
         self._host.pan(round(1000 * rate))
         self._write(now)
 

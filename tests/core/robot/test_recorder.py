@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
+from mcap.exceptions import EndOfFile, McapError
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 
@@ -59,9 +59,13 @@ def test_a_cut_log_gives_back_what_was_written(tmp_path: Path) -> None:
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(whole[: len(whole) // 2])
     count = 0
-    with cut.open("rb") as file, pytest.raises(Exception):  # noqa: B017, PT011 - any end of data
-        for record in StreamReader(file).records:
-            count += type(record).__name__ == "Message"
+    with cut.open("rb") as file:
+        records = StreamReader(file).records
+        try:
+            for record in records:
+                count += type(record).__name__ == "Message"
+        except (McapError, EndOfFile):
+            pass
     assert count > 1000
 
 

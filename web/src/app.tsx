@@ -9,7 +9,8 @@ import { TimeStrip } from "./panels/timestrip";
 import { ToolRail } from "./panels/toolrail";
 import { Places, TopBar } from "./panels/topbar";
 import { Conflict } from "./places/conflict";
-import { newSite, openSite, saved } from "./state/draft";
+import { newSite, openSite, openUnsaved, saved, unsavedSites } from "./state/draft";
+import { NEW_ID } from "./core/address";
 import { go, location } from "./state/location";
 import { about } from "./state/robot";
 import { refreshSites, sites } from "./state/sites";
@@ -20,18 +21,29 @@ narrow.addEventListener("change", () => {
   phone.value = narrow.matches;
 });
 
+/** Back at a site that was never saved: the one on the table, else the last one that was begun. */
+function openNewest(): void {
+  if (saved.value?.id === null) return;
+  const last = unsavedSites().pop();
+  if (last) openUnsaved(last.key);
+  else newSite();
+}
+
 /** The address may name a site; else the robot's own is opened, else the first, else a new one. */
 function openWhatIsAsked(): void {
   const { place, id } = location.value;
   const wanted = place === "draw" || place === "check" ? id : null;
+  if (wanted === NEW_ID) {
+    untracked(openNewest);
+    return;
+  }
   if (wanted !== null) {
     untracked(() => void openSite(wanted));
     return;
   }
   if (saved.peek() !== null) {
-    const known = saved.peek()?.id ?? null;
-    if (known !== null && (place === "draw" || place === "check"))
-      untracked(() => go({ id: known }, true));
+    const known = saved.peek()?.id ?? NEW_ID;
+    if (place === "draw" || place === "check") untracked(() => go({ id: known }, true));
     return;
   }
   const list = sites.value;

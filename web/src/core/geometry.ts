@@ -74,8 +74,29 @@ export function insideRing(p: Point, ring: readonly Point[]): boolean {
   return inside;
 }
 
-/** A place to write a word on a ring: the mean of its corners, which lies well for small pockets. */
+/** A place to write a word on a ring: of a few places inside the one farthest from its edges. */
 export function ringLabel(ring: readonly Point[]): Point {
+  const box = bounds(ring);
+  let best: Point | null = null;
+  let farthest = 0;
+  const steps = 16;
+  for (let i = 0; box && i < steps * steps; i++) {
+    const across = ((i % steps) + 0.5) / steps;
+    const up = (Math.floor(i / steps) + 0.5) / steps;
+    const p: Point = [box[0] + across * (box[2] - box[0]), box[1] + up * (box[3] - box[1])];
+    if (!insideRing(p, ring)) continue;
+    const clear = Math.min(
+      ...edges(ring, true).map(([a, b]) => distance(p, nearestOnSegment(p, a, b))),
+    );
+    if (clear > farthest) {
+      farthest = clear;
+      best = p;
+    }
+  }
+  return best ?? cornerMean(ring);
+}
+
+function cornerMean(ring: readonly Point[]): Point {
   const n = Math.max(1, ring.length);
   return [ring.reduce((sum, p) => sum + p[0], 0) / n, ring.reduce((sum, p) => sum + p[1], 0) / n];
 }

@@ -62,7 +62,7 @@ export function PrimaryAction() {
       </Button>
     );
   }
-  if (place === "drive") {
+  if (place === "drive" && !stale.value) {
     return (
       <Button kind="primary" onClick={() => go({ place: "check", id: saved.value?.id ?? null })}>
         Choose a job

@@ -78,14 +78,15 @@ const noMouse = window.matchMedia("(hover: none)");
 /** What to do next, and for fingers what the keys would do. */
 function DrawingLine() {
   const tool = sketch.value;
-  const text = drawingLine(tool);
+  const enough = tool && tool.points.length >= fewest(tool.kind);
+  const text = noMouse.matches && enough ? "Tap the next corner, or Finish." : drawingLine(tool);
   return (
     <>
       <span class="line">{noMouse.matches ? text.replace("Click", "Tap") : text}</span>
       {tool && tool.points.length > 0 && (
         <span class="strip-buttons">
           <IconButton icon="undo" label="Take back one corner" onClick={() => pressKey("Escape")} />
-          <Button disabled={tool.points.length < fewest(tool.kind)} onClick={finishSketch}>
+          <Button disabled={!enough} onClick={finishSketch}>
             Finish
           </Button>
         </span>

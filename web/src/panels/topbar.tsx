@@ -2,9 +2,9 @@
 
 import { shownSite } from "../map/scene";
 import { dirty, saved, site } from "../state/draft";
-import { format, go, location, PLACE_NAMES, PLACES, type Place } from "../state/location";
-import { mission, snapshot } from "../state/robot";
-import { run } from "../state/runs";
+import { format, PLACE_NAMES, PLACES, type Place } from "../core/address";
+import { go, location } from "../state/location";
+import { mission, snapshot, stale } from "../state/robot";
 import { PrimaryAction } from "./primary";
 import { StatePill } from "./statepill";
 
@@ -37,7 +37,6 @@ export function Places() {
 export function TopBar({ phone }: { phone: boolean }) {
   const drawing = location.value.place === "draw" || location.value.place === "check";
   const name = (drawing ? site.value.name : shownSite.value.name) || "No site";
-  void run.value;
   return (
     <header class="topbar panel">
       <h1 class="site-name" title={name}>
@@ -47,7 +46,7 @@ export function TopBar({ phone }: { phone: boolean }) {
       {!phone && <Places />}
       <StatePill />
       <span class="reason" title={snapshot.value?.reason}>
-        {!phone && mission.value === null ? "" : (snapshot.value?.reason ?? "")}
+        {mission.value === null || stale.value ? "" : snapshot.value?.reason}
       </span>
       {!phone && <PrimaryAction />}
     </header>

@@ -55,7 +55,6 @@ function Mission({ now }: { now: Snapshot }) {
           <Fact name="Predicted">{duration(missionPlan.value.predicted.duration)}</Fact>
         )}
       </Facts>
-      <Button onClick={end}>End run</Button>
     </>
   );
 }
@@ -139,9 +138,12 @@ export function Drive() {
   }
   return (
     <div class={stale.value ? "dimmed" : ""}>
-      <p class="state-line">
-        <strong>{STATE_WORDS[now.state]}</strong>
-        {now.reason && `: ${now.reason}`}
+      <div class="row">
+        <h3>{STATE_WORDS[now.state]}</h3>
+        {mission.value && <Button onClick={end}>End run</Button>}
+      </div>
+      <p class="state-line" title={now.reason}>
+        {now.reason}
       </p>
       {stale.value && (
         <p class="hint">
@@ -163,8 +165,8 @@ export function Drive() {
       <Mission now={now} />
       <CameraPicture />
       <Pose now={now} />
-      <Events now={now} />
       <Simulation now={now} />
+      <Events now={now} />
       <p>
         <a href="/viser/" target="_blank" rel="noopener">
           Open the 3D panel

@@ -4,7 +4,17 @@ import { useSignal } from "@preact/signals";
 import { useRef } from "preact/hooks";
 import type { SiteSummary } from "../api/types";
 import { clock } from "../core/format";
-import { dirty, discardChanges, newSite, openSite, saved, site } from "../state/draft";
+import {
+  dirty,
+  discardChanges,
+  dropUnsaved,
+  newSite,
+  openSite,
+  openUnsaved,
+  saved,
+  site,
+  unsavedSites,
+} from "../state/draft";
 import { go } from "../state/location";
 import { deleteSite, download, duplicateSite, readFile, sites } from "../state/sites";
 import { Button, Dialog, Empty, IconButton, Section } from "../ui/controls";
@@ -34,6 +44,19 @@ function Row({ summary, onDelete }: { summary: SiteSummary; onDelete: () => void
   );
 }
 
+function UnsavedRow({ name, kept }: { name: string; kept: string }) {
+  const here = saved.value?.key === kept;
+  return (
+    <li class={here ? "here" : ""}>
+      <button type="button" class="link" aria-current={here} onClick={() => openUnsaved(kept)}>
+        {name}
+      </button>
+      <span class="unsaved">not saved</span>
+      <IconButton icon="trash" label={`Drop ${name}`} onClick={() => dropUnsaved(kept)} />
+    </li>
+  );
+}
+
 export function SiteList() {
   const doomed = useSignal<SiteSummary | null>(null);
   const input = useRef<HTMLInputElement>(null);
@@ -55,6 +78,9 @@ export function SiteList() {
               doomed.value = summary;
             }}
           />
+        ))}
+        {unsavedSites().map(({ key, name }) => (
+          <UnsavedRow key={key} kept={key} name={name} />
         ))}
       </ul>
       <div class="buttons">
@@ -106,7 +132,10 @@ export function SiteList() {
                 doomed.value = null;
                 if (!summary) return;
                 void deleteSite(summary).then((gone) => {
-                  if (gone && saved.value?.id === summary.id) newSite();
+                  if (!gone || saved.value?.id !== summary.id) return;
+                  const next = sites.value?.[0];
+                  if (next) void open(next.id);
+                  else newSite();
                 });
               }}
             >

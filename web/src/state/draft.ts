@@ -18,14 +18,17 @@ import {
   type Selection,
   type Site,
 } from "../core/site";
-import { formatSelection, go, location, parseSelection } from "./location";
+import { formatSelection, NEW_ID, parseSelection } from "../core/address";
+import { go, location } from "./location";
 import { doing, say, sentenceOf } from "./notice";
 import { readRobotSite } from "./robot";
 import { refreshSites } from "./sites";
-import { stored, storeText } from "./storage";
+import { stored, storedKeys, storeText } from "./storage";
 
 interface Saved {
   id: number | null;
+  /** Under which name the browser keeps what is not saved. */
+  key: string;
   version: number | null;
   site: Site;
 }
@@ -64,7 +67,9 @@ export function select(at: Selection | null): void {
   go({ detail }, location.value.detail !== null && detail !== null);
 }
 
-const keyOf = (id: number | null) => `polepilot.draft.${id ?? "new"}`;
+const PREFIX = "polepilot.draft.";
+const NEW = `${PREFIX}new-`;
+const keyOf = (id: number) => `${PREFIX}${id}`;
 
 function put(next: history.History<Site>): void {
   steps.value = next;
@@ -91,7 +96,7 @@ export function removeSelected(): void {
 }
 
 function lay(record: Saved): void {
-  const kept = stored<KeptDraft>(keyOf(record.id));
+  const kept = stored<KeptDraft>(record.key);
   saved.value = record;
   check.value = null;
   conflict.value = null;
@@ -107,6 +112,7 @@ function lay(record: Saved): void {
 
 const fromRecord = (record: SiteRecord): Saved => ({
   id: record.id,
+  key: keyOf(record.id),
   version: record.version,
   site: asSite(record.site),
 });
@@ -117,24 +123,50 @@ export async function openSite(id: number): Promise<void> {
   if (record) lay(fromRecord(record));
 }
 
+/** Begins a site; one that was begun before and never saved stays in the list. */
 export function newSite(from: Site = emptySite("New site")): void {
-  storeText(keyOf(null), null);
-  lay({ id: null, version: null, site: emptySite(from.name) });
-  if (from.boundary.length > 0) change(from);
-  go({ place: "draw", id: null, detail: null });
+  let n = 1;
+  while (stored(`${NEW}${n}`)) n += 1;
+  lay({ id: null, key: `${NEW}${n}`, version: null, site: emptySite(from.name) });
+  if (from.boundary.length > 0) {
+    change(from);
+    opened.value += 1;
+  }
+  go({ place: "draw", id: NEW_ID, detail: null });
+}
+
+/** Sites that exist in this browser only. */
+export function unsavedSites(): { key: string; name: string }[] {
+  void site.value;
+  return storedKeys(NEW).map((key) => ({
+    key,
+    name: stored<KeptDraft>(key)?.site.name || "Unnamed",
+  }));
+}
+
+export function openUnsaved(key: string): void {
+  const kept = stored<KeptDraft>(key);
+  if (!kept) return;
+  lay({ id: null, key, version: null, site: emptySite(kept.site.name) });
+  const { place, id } = location.value;
+  if (place !== "draw" || id !== NEW_ID) go({ place: "draw", id: NEW_ID, detail: null });
+}
+
+export function dropUnsaved(key: string): void {
+  storeText(key, null);
+  if (saved.value?.key === key) newSite();
 }
 
 function settle(record: SiteRecord, sent: Site): void {
   const known = asSite(record.site);
-  storeText(keyOf(saved.value?.id ?? null), null);
-  storeText(keyOf(record.id), null);
+  if (saved.value) storeText(saved.value.key, null);
   // The server may have mended the drawing. What was drawn while it answered stays.
   const still = steps.value.present === sent;
-  saved.value = { id: record.id, version: record.version, site: still ? known : sent };
+  saved.value = { ...fromRecord(record), site: still ? known : sent };
   if (still) put(history.amend(steps.value, known));
   conflict.value = null;
-  if (location.value.place === "draw" && location.value.id !== record.id)
-    go({ id: record.id }, true);
+  const { place, id } = location.value;
+  if ((place === "draw" || place === "check") && id !== record.id) go({ id: record.id }, true);
   say(record.repairs.length > 0 ? `Saved. ${record.repairs.join(" ")}` : "Saved.");
   void refreshSites();
   void readRobotSite();
@@ -170,8 +202,7 @@ export async function keepMineAsCopy(): Promise<void> {
   const mine = { ...site.value, name: `${site.value.name} (copy)` };
   const record = await doing("Saving your copy", () => api.createSite(mine));
   if (!record) return;
-  const old = saved.value?.id ?? null;
-  storeText(keyOf(old), null);
+  if (saved.value) storeText(saved.value.key, null);
   conflict.value = null;
   lay(fromRecord(record));
   go({ place: "draw", id: record.id, detail: null });
@@ -195,7 +226,7 @@ export function discardChanges(): void {
   const base = saved.value;
   if (!base) return;
   put(history.record(steps.value, base.site));
-  storeText(keyOf(base.id), null);
+  storeText(base.key, null);
 }
 
 // Unsaved changes outlive the page.
@@ -203,7 +234,7 @@ effect(() => {
   const base = saved.value;
   if (!base) return;
   const kept: KeptDraft = { version: base.version, site: site.value };
-  storeText(keyOf(base.id), dirty.value ? JSON.stringify(kept) : null);
+  storeText(base.key, dirty.value ? JSON.stringify(kept) : null);
 });
 
 // Live check: a moment after the last change.
@@ -230,5 +261,5 @@ effect(() => {
 
 window.addEventListener("beforeunload", (event) => {
   // Kept in the browser anyway; ask only where it keeps nothing.
-  if (dirty.value && !stored(keyOf(saved.value?.id ?? null))) event.preventDefault();
+  if (dirty.value && !stored(saved.value?.key ?? "")) event.preventDefault();
 });

@@ -26,6 +26,8 @@ function handle(event: KeyboardEvent): boolean {
     if (!event.repeat) void stop();
     return true;
   }
+  // A question on the screen is answered first.
+  if (document.querySelector("[role=dialog]")) return false;
   if (location.value.place !== "draw") return false;
   const command = event.ctrlKey || event.metaKey;
   const key = event.key.toLowerCase();

@@ -18,6 +18,17 @@ export function storeText(key: string, text: string | null): boolean {
   }
 }
 
+/** The names of what is kept that begin so, in order. */
+export function storedKeys(prefix: string): string[] {
+  try {
+    return Object.keys(window.localStorage)
+      .filter((key) => key.startsWith(prefix))
+      .sort();
+  } catch {
+    return [];
+  }
+}
+
 export function stored<T>(key: string): T | null {
   try {
     return JSON.parse(storedText(key) ?? "null") as T | null;

@@ -43,6 +43,8 @@ _PLAIN = math.radians(3.0)
 _CHORD = 0.12
 """What is longer than this is no chord of an arc, metres."""
 _ARC = math.radians(5.0)
+_PATIENCE = 12
+"""How often backing out may fail before it is no longer tried."""
 _MOST_TURNS = 80
 """So many ways round one corner are tried, the cheapest first."""
 _SHORT = 0.15
@@ -115,6 +117,7 @@ class Driver:
         self._space = space
         self._radius = radius * _RADIUS_MARGIN
         self.track = Track(pose)
+        self._patience = _PATIENCE
         self._reserve = 0.0
         """How much of the leg after a corner left as it is must stay straight, metres."""
 
@@ -195,13 +198,15 @@ class Driver:
             return True
         if self._connect_here(place, heading):
             return True
-        if not back_out:
+        if not back_out or self._patience <= 0:
             return False
+        self._patience -= 1
         saved = self._save()
         for distance in _BACK_OUT:
             # From the same place each time: backing out twice would lead in again.
             enough = self._back_out(distance)
             if self._connect_here(place, heading):
+                self._patience = min(self._patience + 1, _PATIENCE)
                 return True
             self._restore(saved)
             if not enough:

@@ -5,7 +5,7 @@ machine that has none; a Node on the PATH serves where that wheel is missing. A 
 of everything under web/ makes sure that nothing is built twice. By hand:
 
     python hatch_build.py               build the page if it is out of date
-    python hatch_build.py --node-path   print the folder of the Node that would be used
+    python hatch_build.py --npm WORDS   npm WORDS in web/, with the Node that would be used
 
 `POLEPILOT_PAGE=skip` installs without building; the service then says that it has no page.
 """
@@ -118,13 +118,26 @@ def build_page(root: Path) -> bool:
     return True
 
 
+def run_npm(web: Path, words: list[str]) -> int:
+    """``npm WORDS`` with its own output; its exit status."""
+    node, npm = find_node()
+    return subprocess.run(
+        [str(node), str(npm), *words], cwd=web, env=with_node(node), check=False
+    ).returncode
+
+
+def with_node(node: Path) -> dict[str, str]:
+    """The environment with Node first on the PATH."""
+    path = os.pathsep.join([str(node.resolve().parent), os.environ.get("PATH", os.defpath)])
+    return {**os.environ, "PATH": path}
+
+
 def run(node: Path, web: Path, arguments: list[str], name: str) -> None:
     """One step of the build; its words are shown only where it fails."""
-    path = os.pathsep.join([str(node.resolve().parent), os.environ.get("PATH", os.defpath)])
     done = subprocess.run(
         [str(node), *arguments],
         cwd=web,
-        env={**os.environ, "PATH": path},
+        env=with_node(node),
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
@@ -155,12 +168,12 @@ class PageBuildHook(BuildHookInterface):  # type: ignore[misc]
 
 def main() -> int:
     try:
-        if sys.argv[1:] == ["--node-path"]:
-            print(find_node()[0].resolve().parent)
-        elif sys.argv[1:]:
-            raise PageError(f"unknown words {sys.argv[1:]}: expected nothing or --node-path.")
-        else:
-            build_page(Path(__file__).resolve().parent)
+        root = Path(__file__).resolve().parent
+        if sys.argv[1:2] == ["--npm"]:
+            return run_npm(root / "web", sys.argv[2:])
+        if sys.argv[1:]:
+            raise PageError(f"unknown words {sys.argv[1:]}: expected nothing or --npm WORDS.")
+        build_page(root)
     except PageError as error:
         say(str(error))
         return 1

@@ -41,7 +41,7 @@ def file_response(static: Path, path: str, accepted: str) -> Response:
     if not found:
         if name == "index.html":
             raise NotFoundError(
-                "The page is not built.", code="page_not_built", remedy="Run ./run build."
+                "The page is not built.", code="page_not_built", remedy="Install again without POLEPILOT_PAGE=skip."
             )
         raise NotFoundError("There is nothing at this address.")
     headers = {

@@ -14,6 +14,9 @@ from polepilot.core.robot.ports import Sighting
 _QUALITY = 85
 _INK = (255, 144, 30)
 _PAPER = (255, 255, 255)
+_TEXT = (90, 40, 0)
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+_SIZE = 0.45
 
 
 class Pictures:
@@ -53,9 +56,9 @@ def draw(image: Image, sighting: Sighting) -> Image:
         top, bottom = round(detection.top), round(detection.bottom)
         cv2.rectangle(picture, (left, top), (right, bottom), _INK, 1, cv2.LINE_AA)
         text = f"{detection.id}  {detection.range:.2f} m"
-        place = (min(right + 4, picture.shape[1] - 90), max(14, top + 12))
-        for color, width in ((_PAPER, 3), (_INK, 1)):
-            cv2.putText(
-                picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.45, color, width, cv2.LINE_AA
-            )
+        (width, height), below = cv2.getTextSize(text, _FONT, _SIZE, 1)
+        x = max(0, min(right + 4, picture.shape[1] - width - 4))
+        y = max(height + 2, min(top + height + 2, picture.shape[0] - below))
+        cv2.rectangle(picture, (x - 2, y - height - 2), (x + width + 2, y + below), _PAPER, -1)
+        cv2.putText(picture, text, (x, y), _FONT, _SIZE, _TEXT, 1, cv2.LINE_AA)
     return np.asarray(picture, dtype=np.uint8)

@@ -241,7 +241,7 @@ class RunRecord(Model):
     started_at: float
     ended_at: float | None
     outcome: str | None
-    """None while it runs; then done, ended, failed, or interrupted (the service died meanwhile)."""
+    """None while it runs; then done, paused (ended by hand), failed, or interrupted."""
     reason: str
     coverage: float | None
     travelled: float

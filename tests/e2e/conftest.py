@@ -95,8 +95,9 @@ def service(tmp_path: Path) -> Iterator[Service]:
     running.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
+    # Not for the whole session: as long as it lives its event loop counts as running.
     chromium = shutil.which("chromium")
     assert chromium, "Chromium is missing: ./run test installs it."
     with sync_playwright() as playwright:

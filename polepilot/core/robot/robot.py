@@ -116,6 +116,8 @@ class Robot:
         self._last_tick: float | None = None
         self._last_moving = 0.0
         self._waiting: deque[Sighting] = deque(maxlen=8)
+        self._looks_from = 0.0
+        """Pictures from before the present map was loaded are not looked at."""
         self._sighting: Sighting | None = None
         self._telemetry: TelemetrySample | None = None
         self._estimate: PoseEstimate | None = None
@@ -170,6 +172,7 @@ class Robot:
         self._estimate = None
         self._was_fixed = False
         self._waiting.clear()
+        self._looks_from = self._now
         self._say("site_loaded", "info", f"Map {site.name!r} loaded; looking for landmarks.")
 
     def start(self, plan: Plan, run_id: int, recorder: Recorder) -> None:
@@ -291,7 +294,7 @@ class Robot:
         except CameraError as error:
             sighting = None
             self._fault("camera", str(error))
-        if sighting is not None:
+        if sighting is not None and sighting.stamp >= self._looks_from:
             self._sighting = sighting
             self._waiting.append(sighting)
 

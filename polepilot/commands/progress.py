@@ -18,7 +18,9 @@ _EVERY = 25
 def mission_progress() -> Iterator[Callable[[Snapshot], None]]:
     """A bar of the mission's progress with its state; feed it every snapshot."""
     columns = (TextColumn("{task.description:10}"), BarColumn(), TextColumn("{task.fields[note]}"))
-    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True)) as bars:
+    with Progress(
+        *columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True
+    ) as bars:
         task = bars.add_task("fixing", total=1.0, note="")
 
         def show(snapshot: Snapshot) -> None:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def detect(
-    files: Annotated[list[Path], typer.Argument(help="Pictures; each is looked at by itself.")],
+    files: Annotated[list[str], typer.Argument(help="Pictures; each is looked at by itself.")],
     camera_constant: Annotated[
         float, typer.Option(help="Camera constant in pixels, for the pictures as given.")
     ] = 600.0,
@@ -64,7 +64,7 @@ def detect(
     for file, image in zip(files, images, strict=True):
         camera = _camera(image, camera_constant, axis)
         found = _detector(detector, camera, kinds).detect(image)
-        frames.append((str(file), found))
+        frames.append((file, found))
         if annotate is not None:
             _annotate(image, found, annotate)
     if as_json:
@@ -119,12 +119,15 @@ def _kinds(
 
     if shape not in ("cylinder", "flat"):
         raise InputError(f"--shape is {shape!r}: expected 'cylinder' or 'flat'.")
-    kind = LandmarkKind(
-        bits=bits,
-        segment=segment,
-        diameter=diameter,
-        shape="cylinder" if shape == "cylinder" else "flat",
-    )
+    try:
+        kind = LandmarkKind(
+            bits=bits,
+            segment=segment,
+            diameter=diameter,
+            shape="cylinder" if shape == "cylinder" else "flat",
+        )
+    except InputError as error:
+        raise InputError(f"--{error.message}") from error  # its fields are our options
     chosen = range(1, 2**bits) if ids is None else parse_ids(ids, bits)
     return dict.fromkeys(chosen, kind)
 

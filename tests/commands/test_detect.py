@@ -50,6 +50,17 @@ def test_json_is_one_document(near: str, empty: str, capsys: pytest.CaptureFixtu
     assert 0 < found["bearing_sigma"] < 0.01
 
 
+def test_names_are_given_back_as_they_were_given(
+    near: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(Path(near).parent)
+    given = ["./near.png", f".//{Path(near).parent.name}/../near.png", near]
+    (Path(near).parent / Path(near).parent.name).mkdir()
+    assert run(["detect", *given, "--json"]) == 0
+    frames = json.loads(capsys.readouterr().out)["frames"]
+    assert [frame["file"] for frame in frames] == given
+
+
 def test_options_change_the_answer(near: str, capsys: pytest.CaptureFixture[str]) -> None:
     def ask(*options: str) -> list[dict[str, float]]:
         assert run(["detect", near, "--json", *options]) == 0
@@ -127,7 +138,7 @@ def test_bad_options(near: str, options: list[str], capsys: pytest.CaptureFixtur
     out, err = capsys.readouterr()
     assert out == ""
     assert err.count("\n") == 1
-    assert options[0].lstrip("-").split("-")[0] in err
+    assert options[0] in err
 
 
 def test_lists_of_ids_and_centres() -> None:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from polepilot.core.observation import Image
 
-app = typer.Typer(help="Measure speed.", no_args_is_help=True)
+app = typer.Typer(help="Measure speed.")
 
 _PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".webp", ".tif", ".tiff")
 _WARM_UP = 10

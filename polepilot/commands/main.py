@@ -28,7 +28,6 @@ from polepilot.core.errors import InputError, PolepilotError, RefusedError
 app = typer.Typer(
     name="polepilot",
     help="Web-controlled brain of a mobile robot that finds its way by barcode poles.",
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -66,6 +65,10 @@ def run(arguments: list[str]) -> int:
     except BrokenPipeError:
         # The reader of our output has gone (``| head``): nobody is left to tell.
         sys.stderr.close()
+        return 1
+    except OSError as error:
+        # A full disk, a device that is gone: nobody's mistake, and no traceback helps.
+        _say(f"{error.filename or 'polepilot'}: {error.strerror or error}.")
         return 1
 
 

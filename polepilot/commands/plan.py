@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -50,14 +52,16 @@ def plan(
     from polepilot.core.site import read_site
 
     site = read_site(site_file)
-    options = PlanOptions(
-        tool_width=tool_width,
-        clearance=clearance,
-        min_turn_radius=min_turn_radius,
-        start=parse_start(start) if start is not None else None,
-        order=order.value,
-    )
-    result = make_plan(site, mode, route, options)
+    with naming_options():
+        options = PlanOptions(
+            tool_width=tool_width,
+            clearance=clearance,
+            min_turn_radius=min_turn_radius,
+            start=parse_start(start) if start is not None else None,
+            order=order.value,
+        )
+    with naming_file(site_file):
+        result = make_plan(site, mode, route, options)
     if plot is not None:
         try:
             plot.write_text(plot_svg(site, result), encoding="utf-8")
@@ -88,6 +92,30 @@ def make_plan(site: Site, mode: JobMode, route: str | None, options: PlanOptions
     if route is not None:
         raise InputError("--route is given with --mode scan: expected --mode route.")
     return plan_scan(site, options)
+
+
+@contextmanager
+def naming_options() -> Iterator[None]:
+    """Errors of ``PlanOptions`` speak of its fields: here they speak of options."""
+    from polepilot.core.errors import InputError, PlanError
+
+    try:
+        yield
+    except PlanError as error:
+        name, _, rest = error.message.partition(" ")
+        raise InputError(f"--{name.replace('_', '-')} {rest}") from error
+
+
+@contextmanager
+def naming_file(site_file: Path) -> Iterator[None]:
+    """Errors of planning speak of the site: here they name its file."""
+    from polepilot.core.errors import InputError, PlanError, SiteError
+
+    try:
+        yield
+    except (PlanError, SiteError) as error:
+        message = f"{site_file}: {error.message}"
+        raise InputError(message, remedy=error.remedy, code=error.code) from error
 
 
 def parse_start(text: str) -> Start:

@@ -39,7 +39,7 @@ def simulate(
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document.")] = False,
 ) -> None:
     """Drive a plan with the simulated robot and say how well it went."""
-    from polepilot.commands.plan import make_plan, parse_start
+    from polepilot.commands.plan import make_plan, naming_file, naming_options, parse_start
     from polepilot.commands.progress import mission_progress
     from polepilot.commands.simulation import Simulation
     from polepilot.core.errors import InputError, RefusedError
@@ -55,15 +55,17 @@ def simulate(
             "2 to know where it is.",
             code="no_landmarks",
         )
-    options = PlanOptions.from_vehicle(
-        settings.model.vehicle,
-        tool_width=tool_width,
-        clearance=clearance,
-        min_turn_radius=min_turn_radius,
-        start=None if start is None else parse_start(start),
-        order=order.value,
-    )
-    plan = make_plan(site, mode, route, options)
+    with naming_options():
+        options = PlanOptions.from_vehicle(
+            settings.model.vehicle,
+            tool_width=tool_width,
+            clearance=clearance,
+            min_turn_radius=min_turn_radius,
+            start=None if start is None else parse_start(start),
+            order=order.value,
+        )
+    with naming_file(site_file):
+        plan = make_plan(site, mode, route, options)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -74,6 +76,7 @@ def simulate(
         settings.robot,
         seed=seed,
         rendered=sensing is Sensing.rendered,
+        start=options.start or site.start,
         log=out / "run.mcap",
     )
     limit = 3 * plan.predicted.duration + 120 if duration is None else duration

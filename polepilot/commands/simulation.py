@@ -24,7 +24,7 @@ from polepilot.core.robot.robot import Robot, RobotSettings
 from polepilot.core.robot.snapshot import Snapshot, State
 from polepilot.core.sim.motion import Disturbances
 from polepilot.core.sim.world import World
-from polepilot.core.site import Site
+from polepilot.core.site import Site, Start
 from polepilot.core.trajectory import (
     ErrorStatistics,
     Trajectory,
@@ -138,15 +138,18 @@ class Simulation:
         seed: int,
         rendered: bool,
         log: Path,
+        start: Start | None = None,
         disturbances: Disturbances | None = None,
     ) -> Simulation:
-        """A fresh world with the robot at the start of its plan; ``disturbances`` None draws one
-        robot of a series from the seed."""
+        """A fresh world with the robot at the start of its plan, looking as ``start`` says.
+
+        ``disturbances`` None draws one robot of a series from the seed.
+        """
         world = World(
             site,
             settings.model,
             seed=seed,
-            start=_start_pose(site, plan),
+            start=_start_pose(plan, start),
             disturbances=disturbances,
             full_speed=settings.calibration.full_speed_left,
         )
@@ -234,10 +237,10 @@ class Simulation:
         )
 
 
-def _start_pose(site: Site, plan: Plan) -> Pose2D:
-    """At the plan's first point; looking as the site says, else along the first segment."""
+def _start_pose(plan: Plan, start: Start | None) -> Pose2D:
+    """At the plan's first point; looking as ``start`` says, else along the first segment."""
     (x0, y0), (x1, y1) = plan.path[0], plan.path[1]
-    if site.start is not None and site.start.heading is not None:
-        return Pose2D(float(x0), float(y0), site.start.heading)
+    if start is not None and start.heading is not None:
+        return Pose2D(float(x0), float(y0), start.heading)
     heading = np.arctan2((y1 - y0) * plan.gear[0], (x1 - x0) * plan.gear[0])
     return Pose2D(float(x0), float(y0), float(heading))

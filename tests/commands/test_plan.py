@@ -63,12 +63,14 @@ def test_route_and_summary() -> None:
     [
         (["nowhere.json"], "cannot be read"),
         ([DEMO, "--mode", "route"], "--route is missing: the site's routes are 'Tour'"),
-        ([DEMO, "--mode", "route", "--route", "X"], "'X' is not on the site"),
+        ([DEMO, "--mode", "route", "--route", "X"], f"^{DEMO}: route 'X' is not on the site"),
+        ([DEMO, "--clearance", "9"], f"^{DEMO}: the robot fits nowhere .* clearance of 900 cm"),
+        ([DEMO, "--start", "99,1"], f"^{DEMO}: the start .* is not on the floor"),
         ([DEMO, "--route", "Tour"], "expected --mode route"),
         ([DEMO, "--start", "1;2"], "--start is '1;2'"),
         ([DEMO, "--start", "nan,2"], "expected X,Y"),
-        ([DEMO, "--tool-width", "nan"], "tool_width is nan"),
-        ([DEMO, "--clearance", "-1"], "clearance is -1"),
+        ([DEMO, "--tool-width", "nan"], "^--tool-width is nan"),
+        ([DEMO, "--clearance", "-1"], "^--clearance is -1"),
         ([DEMO, "--min-turn-radius", "0", "--plot", "/nowhere/x.svg"], "cannot be written"),
     ],
 )

@@ -64,10 +64,8 @@ def test_the_same_seed_gives_the_same_run(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     words = (str(DEMO), "--mode", "scan", "--duration", "8", "--seed", "5")
-    results = []
-    for name in ("a", "b"):
-        results.append(simulate(capfd, *words, "--out", str(tmp_path / name)))
-    assert results[0]["outcome"] == "timeout"
+    first, _ = (simulate(capfd, *words, "--out", str(tmp_path / name)) for name in ("a", "b"))
+    assert first["outcome"] == "timeout"
     for file in ("real.tum", "estimated.tum", "measured.tum", "target.csv"):
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
 
@@ -112,3 +110,12 @@ def test_bad_input_is_one_clear_line(
     assert told.err.count("\n") == 1, told.err
     assert named in told.err
     assert "Traceback" not in told.err
+
+
+def test_a_start_that_is_asked_for_counts_for_the_robot_too(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    words = ("--mode", "scan", "--sensing", "measured", "--duration", "1")
+    simulate(capfd, str(DEMO), *words, "--start", "4,1,2.5", "--out", str(tmp_path))
+    first = read_tum(tmp_path / "real.tum").poses[0]
+    assert first == pytest.approx((4.0, 1.0, 2.5), abs=0.01)

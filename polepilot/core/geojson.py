@@ -61,8 +61,9 @@ def _add(site: dict[str, Any], feature: Any, field: str, reader: Reader) -> None
         raise reader.refuse(
             field, f"({role}) is a {str(geometry.get('type'))[:40]}: expected a {expected}."
         )
+    where = f"{field}.coordinates"
     coordinates = _flat(
-        reader.array(geometry.get("coordinates"), f"{field}.coordinates", "coordinates")
+        reader.array(geometry.get("coordinates"), where, "coordinates"), where, reader
     )
     if role == "boundary":
         if "boundary" in site:
@@ -90,12 +91,15 @@ def _add(site: dict[str, Any], feature: Any, field: str, reader: Reader) -> None
         site["start"] = coordinates if heading is None else [*coordinates, heading]
 
 
-def _flat(coordinates: list[Any]) -> list[Any]:
-    """Coordinates without heights, and rings without their repeated last point."""
+def _flat(coordinates: list[Any], where: str, reader: Reader, depth: int = 3) -> list[Any]:
+    """Coordinates without heights: lists in ``depth`` levels, a Polygon's being the deepest."""
     if coordinates and not any(isinstance(entry, list | tuple) for entry in coordinates):
         return coordinates[:2]
+    if depth == 1:
+        raise reader.refuse(where, "has lists within points: expected numbers [x, y].")
     return [
-        _flat(list(entry)) if isinstance(entry, list | tuple) else entry for entry in coordinates
+        _flat(list(entry), where, reader, depth - 1) if isinstance(entry, list | tuple) else entry
+        for entry in coordinates
     ]
 
 

@@ -169,6 +169,20 @@ def test_geojson_of_other_programs_is_read() -> None:
         parse_site(document, "g")
 
 
+def test_geojson_nested_without_end_is_refused() -> None:
+    nested: Any = [1.0, 1.0]
+    for _ in range(900):
+        nested = [nested]
+    feature = {
+        "type": "Feature",
+        "properties": {"role": "wall"},
+        "geometry": {"type": "LineString", "coordinates": nested},
+    }
+    document = {"type": "FeatureCollection", "features": [feature]}
+    with pytest.raises(SiteError, match=r"features\[0\]\.coordinates has lists within points"):
+        parse_site(document, "deep")
+
+
 def test_files_that_are_no_sites(tmp_path: Path) -> None:
     missing = tmp_path / "no.json"
     with pytest.raises(SiteError, match=r"no\.json: cannot be read"):

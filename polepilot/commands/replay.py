@@ -29,7 +29,7 @@ def replay(
     from rich.console import Console
     from rich.progress import Progress
 
-    from polepilot.core.errors import ImageError, InputError
+    from polepilot.core.errors import DatasetError, ImageError, InputError
     from polepilot.core.localization.localizer import LocalizerSettings
     from polepilot.core.observation import Detection
     from polepilot.core.robot.dataset import FrameFile, read_dataset
@@ -49,16 +49,23 @@ def replay(
         camera, {number: mark.kind for number, mark in recording.landmarks.items()}
     )
 
+    unusable: list[str] = []
+
     def see(frame: FrameFile) -> list[Detection]:
-        image = read_image(frame.path)
-        if image.shape[:2] != (camera.height, camera.width):
-            raise ImageError(
-                f"{frame.path}: {image.shape[1]} x {image.shape[0]} pixels: expected "
-                f"{camera.width} x {camera.height}."
-            )
+        try:
+            image = read_image(frame.path)
+            if image.shape[:2] != (camera.height, camera.width):
+                raise ImageError(
+                    f"{frame.path}: {image.shape[1]} x {image.shape[0]} pixels: expected "
+                    f"{camera.width} x {camera.height}."
+                )
+        except ImageError as error:
+            unusable.append(f"samples.jsonl:{frame.line}: {error.message}")
+            raise
         return detector.detect(image)
 
-    with Progress(console=Console(stderr=True), transient=True) as bars:
+    screen = Console(stderr=True)
+    with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bars:
         task = bars.add_task("replaying", total=recording.frames)
         result = run(
             recording,
@@ -66,6 +73,9 @@ def replay(
             LocalizerSettings(method="paper" if method == "paper" else "ekf"),
             lambda done: bars.update(task, completed=done),
         )
+    if len(unusable) == result.frames:
+        # A picture may be lost; with all of them lost it is no recording.
+        raise DatasetError(f"{dataset}: none of its pictures can be used; {unusable[0]}")
     write_results(result, out)
     if json:
         typer.echo(json_module.dumps(result.to_json()))

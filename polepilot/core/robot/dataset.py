@@ -27,6 +27,11 @@ class FrameFile:
 
 Sample = Odometry | PanReading | FrameFile
 
+_LARGEST = 1e12
+"""No time, length or angle of a recording is larger."""
+_MOST = 1_000_000
+"""No count is larger: columns, rows, bits, ids."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Dataset:
@@ -55,11 +60,7 @@ def read_dataset(folder: Path) -> Dataset:
     if not folder.is_dir():
         raise DatasetError(f"{folder}: expected a folder with dataset.json and samples.jsonl.")
     path = folder / "dataset.json"
-    try:
-        document = json.loads(_read_text(path))
-    except json.JSONDecodeError as error:
-        raise DatasetError(f"{path}:{error.lineno}: no valid JSON: {error.msg}.") from error
-    root = _Fields(path, "", document)
+    root = _Fields(path, "", _parse(_read_text(path), path))
     camera, pan = root.child("camera"), root.child("camera")
     minimum, maximum = pan.number("pan_min_rad"), pan.number("pan_max_rad")
     if not minimum < maximum:
@@ -113,23 +114,25 @@ class _Fields:
     def number(self, key: str, above: float | None = None) -> float:
         value = self.value(key)
         good = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not good or not math.isfinite(value) or (above is not None and value <= above):
+        if not good or not -_LARGEST <= value <= _LARGEST or (above is not None and value <= above):
             limit = "" if above is None else f" above {above:g}"
             raise DatasetError(
-                f"{self._where}: {key} is {value!r}: expected a finite number{limit}."
+                f"{self._where}: {key} is {_shown(value)}: expected a finite number{limit}."
             )
         return float(value)
 
     def count(self, key: str) -> int:
         value = self.value(key)
-        if not isinstance(value, int) or isinstance(value, bool) or value < 1:
-            raise DatasetError(f"{self._where}: {key} is {value!r}: expected a whole number >= 1.")
+        if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= _MOST:
+            raise DatasetError(
+                f"{self._where}: {key} is {_shown(value)}: expected a whole number, 1 to {_MOST}."
+            )
         return value
 
     def text(self, key: str) -> str:
         value = self.value(key)
         if not isinstance(value, str) or not value:
-            raise DatasetError(f"{self._where}: {key} is {value!r}: expected a text.")
+            raise DatasetError(f"{self._where}: {key} is {_shown(value)}: expected a text.")
         return value
 
     def kind(self, default: LandmarkKind | None = None) -> LandmarkKind:
@@ -182,14 +185,12 @@ def _samples(folder: Path) -> tuple[Sample, ...]:
     path = folder / "samples.jsonl"
     samples: list[Sample] = []
     last = -math.inf
-    for number, line in enumerate(_read_text(path).splitlines(), start=1):
+    # Not splitlines(): a text inside JSON may hold what Unicode calls the end of a line.
+    for number, line in enumerate(_read_text(path).split("\n"), start=1):
         if not line.strip():
             continue
         where = Path(f"{path}:{number}")
-        try:
-            fields = _Fields(where, "sample", json.loads(line))
-        except json.JSONDecodeError as error:
-            raise DatasetError(f"{where}: no valid JSON: {error.msg}.") from error
+        fields = _Fields(where, "sample", _parse(line, where))
         stamp = fields.number("t")
         if stamp < last:
             raise DatasetError(f"{where}: t = {stamp} follows {last}: expected rising times.")
@@ -204,8 +205,8 @@ def _samples(folder: Path) -> tuple[Sample, ...]:
             samples.append(PanReading(stamp, fields.number("angle")))
         elif kind == "frame":
             picture = folder / fields.text("file")
-            if not picture.is_file():
-                raise DatasetError(f"{where}: there is no picture {picture}.")
+            if not _is_file(picture):
+                raise DatasetError(f"{where}: there is no picture {_shown(str(picture))}.")
             samples.append(FrameFile(stamp, picture, number))
         else:
             raise DatasetError(f"{where}: kind is {kind!r}: expected 'drive', 'pan' or 'frame'.")
@@ -216,9 +217,33 @@ def _samples(folder: Path) -> tuple[Sample, ...]:
     return tuple(samples)
 
 
+def _parse(text: str, where: Path) -> Any:
+    """JSON; ``where`` is the file, or file and line where each line is a document."""
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        line = f":{error.lineno}" if where.is_file() else ""
+        raise DatasetError(f"{where}{line}: no valid JSON: {error.msg}.") from error
+    except (ValueError, RecursionError) as error:  # endless digits, endless brackets
+        raise DatasetError(f"{where}: no JSON that can be read: {error}.") from error
+
+
+def _shown(value: Any) -> str:
+    """A value as messages show it, short."""
+    text = repr(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name that is too long, a folder that may not be looked into
+        return False
+
+
 def _read_text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError as error:
         raise DatasetError(f"{path}: no such file.") from error
     except (OSError, UnicodeDecodeError) as error:

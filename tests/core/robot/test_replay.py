@@ -200,11 +200,34 @@ def changed(**changes: Any) -> dict[str, Any]:
         (DOCUMENT, [{"t": 0, "kind": "drive", "speed": 0}], "'steering' is missing"),
         (DOCUMENT, GOOD[:2], "at least one sample of kind 'frame'"),
         (DOCUMENT, ["word"], "expected an object"),
+        (changed(vehicle={"wheelbase_m": 10**400, "track_m": 1}), GOOD, "finite number"),
+        (changed(landmark={"bits": 10**400}), GOOD, "whole number"),
+        (DOCUMENT, [{"t": 10**400, "kind": "pan", "angle": 0}], ":1: sample: t is 1000"),
+        (DOCUMENT, [{"t": 0, "kind": "frame", "file": "x" * 300}], ":1: there is no picture"),
     ],
 )
 def test_bad_recordings_are_named(tmp_path: Path, document: Any, lines: Any, expected: str) -> None:
     with pytest.raises(DatasetError, match=expected):
         read_dataset(write(tmp_path / "run", document, lines))
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "9" * 5000, '{"t": ' + "9" * 5000 + "}"])
+def test_endless_json_is_refused(tmp_path: Path, text: str) -> None:
+    folder = write(tmp_path / "run")
+    (folder / "samples.jsonl").write_text(json.dumps(GOOD[0]) + "\n" + text)
+    with pytest.raises(DatasetError, match=r"samples\.jsonl:2: no JSON that can be read"):
+        read_dataset(folder)
+    (folder / "dataset.json").write_text(text)
+    with pytest.raises(DatasetError, match=r"dataset\.json: no JSON that can be read"):
+        read_dataset(folder)
+
+
+def test_lines_end_where_the_file_says(tmp_path: Path) -> None:
+    folder = write(tmp_path / "run")
+    note = json.dumps({**GOOD[1], "note": "a\u2028b"}, ensure_ascii=False)
+    lines = [json.dumps(GOOD[0]), note, json.dumps(GOOD[2])]
+    (folder / "samples.jsonl").write_bytes("\r\n".join(["\ufeff" + lines[0], *lines[1:]]).encode())
+    assert len(read_dataset(folder).samples) == 3
 
 
 def test_missing_and_broken_files_are_named(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -110,10 +111,27 @@ def test_what_is_not_offered_is_refused(
     assert not out.exists()
 
 
+def test_a_recording_whose_pictures_are_all_unusable_is_refused(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(recording, folder)
+    document = json.loads((folder / "dataset.json").read_text())
+    document["camera"]["width"] = 640
+    (folder / "dataset.json").write_text(json.dumps(document))
+    assert run(["replay", str(folder), "--out", str(tmp_path / "out"), "--json"]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert "samples.jsonl:3: " in captured.err
+    assert "400 x 300 pixels: expected 640 x 300" in captured.err
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_missing_recording_is_one_clear_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["replay", str(tmp_path / "gone"), "--out", str(tmp_path / "out")]) == 2
-    lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 1
-    assert "dataset.json" in lines[0]
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "dataset.json" in error

@@ -29,6 +29,7 @@ from polepilot.core.planning.score import predict
 from polepilot.core.planning.space import FreeSpace, as_multi, free_poles, free_space
 from polepilot.core.planning.swept import swept_shape
 from polepilot.core.planning.unreachable import unreachable_pieces
+from polepilot.core.planning.wording import in_words
 from polepilot.core.site import Site
 
 Gears = NDArray[np.int8]
@@ -66,7 +67,7 @@ def plan_scan(
     if reachable.area / options.tool_width > LONGEST:
         raise PlanError(
             f"the reachable area of {reachable.area:.0f} m² is too large for a tool of "
-            f"{options.tool_width:g} m: expected a path of at most {LONGEST / 1000:.0f} km."
+            f"{in_words(options.tool_width)}: expected a path of at most {LONGEST / 1000:.0f} km."
         )
     target = reachable if area is None else as_multi(reachable.intersection(area.buffer(0)))
     if target.area < 1e-4:
@@ -287,12 +288,12 @@ def _driven_path(
     if left > 0.02 * target.area:
         notes.append(
             f"{left:.2f} m² cannot be swept with a turning radius of "
-            f"{options.min_turn_radius:g} m and a clearance of {options.clearance:g} m."
+            f"{in_words(options.min_turn_radius)} and a clearance of {in_words(options.clearance)}."
         )
     if len(path) < 2:
         raise PlanError(
             f"the robot cannot move from the start with a turning radius of "
-            f"{options.min_turn_radius:g} m."
+            f"{in_words(options.min_turn_radius)}."
         )
     return path, gear, tuple(recorder.parts)
 

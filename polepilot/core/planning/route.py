@@ -18,6 +18,7 @@ from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.score import predict
 from polepilot.core.planning.space import FreeSpace, free_space
 from polepilot.core.planning.unreachable import unreachable_pieces
+from polepilot.core.planning.wording import in_words, measured_in_words
 from polepilot.core.site import Site
 from polepilot.core.site_file import place
 
@@ -78,8 +79,8 @@ def _check_nodes(name: str, nodes: tuple[Point, ...], space: FreeSpace) -> None:
             continue
         raise PlanError(
             f"node {index + 1} of route {name!r} at {place(node)} cannot be reached: the nearest "
-            f"place that the robot gets to with a clearance of {space.clearance:g} m is "
-            f"{away:.2f} m away."
+            f"place that the robot gets to with a clearance of {in_words(space.clearance)} is "
+            f"{measured_in_words(away)} away."
         )
 
 
@@ -127,6 +128,6 @@ def _driven(
             if not driver.head_for(goal) and not driver.head_for(way[-1]):
                 raise PlanError(
                     f"the drive to node {index + 1} of route {name!r} at {place(way[-1])} is not "
-                    f"possible with a turning radius of {options.min_turn_radius:g} m."
+                    f"possible with a turning radius of {in_words(options.min_turn_radius)}."
                 )
     return driver.track.arrays()

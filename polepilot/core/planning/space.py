@@ -14,6 +14,7 @@ from shapely import LineString, MultiPolygon, Point, Polygon
 from polepilot.core import geometry
 from polepilot.core.errors import PlanError
 from polepilot.core.planning.options import PlanOptions
+from polepilot.core.planning.wording import in_words, measured_in_words
 from polepilot.core.site import Site, Start
 from polepilot.core.site_file import place
 
@@ -164,8 +165,8 @@ def free_space(site: Site, options: PlanOptions) -> FreeSpace:
     )
     if not pieces:
         raise PlanError(
-            f"the robot fits nowhere on the floor: with a clearance of {options.clearance:g} m "
-            f"it needs passages of {2 * options.clearance:g} m."
+            f"the robot fits nowhere on the floor: with a clearance of "
+            f"{in_words(options.clearance)} it needs passages of {in_words(2 * options.clearance)}."
         )
     start = options.start or site.start
     notes: list[str] = []
@@ -229,14 +230,14 @@ def _at_start(
     if distance > max(0.5 * options.clearance, 0.05) + 0.01:
         raise PlanError(
             f"the robot does not fit at the start {place(start.position)}: the nearest place with "
-            f"a clearance of {options.clearance:g} m is {distance:.2f} m away."
+            f"a clearance of {in_words(options.clearance)} is {measured_in_words(distance)} away."
         )
     line = shapely.shortest_line(home, spot)
     x, y = (float(value) for value in line.coords[0])
     if distance > 0.001:
         notes.append(
-            f"The start {place(start.position)} is nearer to a wall than {options.clearance:g} m; "
-            f"the path begins {distance * 100:.1f} cm away."
+            f"The start {place(start.position)} is nearer to a wall than "
+            f"{in_words(options.clearance)}; the path begins {in_words(distance)} away."
         )
     return home, Start(x, y, start.heading)
 

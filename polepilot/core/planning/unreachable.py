@@ -10,6 +10,7 @@ from shapely import LineString, MultiPolygon, Polygon
 from polepilot.core.geometry import Polyline
 from polepilot.core.plan import Unreachable
 from polepilot.core.planning.space import FreeSpace, polygons
+from polepilot.core.planning.wording import in_words
 
 SMALLEST = 0.05
 """Smaller pieces are not mentioned, m²."""
@@ -34,7 +35,7 @@ def unreachable_pieces(space: FreeSpace, reachable: MultiPolygon) -> tuple[Unrea
         if index < _MOST_REASONS:
             reason = passages.reason(whole)
         else:
-            reason = f"the robot needs {2 * space.clearance:.2f} m of width to get in"
+            reason = f"the robot needs {in_words(2 * space.clearance)} of width to get in"
         pieces += [(simple, reason) for simple in _without_holes(whole)]
     return tuple(
         Unreachable(_ring(piece), reason) for piece, reason in pieces if piece.area >= SMALLEST / 5
@@ -49,14 +50,15 @@ class _Passages:
         self._levels: dict[float, list[Polygon]] = {}
 
     def reason(self, piece: Polygon) -> str:
-        need = f"the robot needs {2 * self._space.clearance:.2f} m"
+        needed = 2 * self._space.clearance
+        need = f"the robot needs {in_words(needed)}"
         inner = [other for other in self._space.others if other.intersects(piece)]
         if not inner:
             circle = shapely.maximum_inscribed_circle(piece, tolerance=0.01)
             width = 2 * float(circle.length)
-            if width < 2 * self._space.clearance:
-                return f"only {width:.2f} m wide, {need}"
-            return f"too narrow to get in, {need}"
+            if width < needed:
+                return f"only {_less(width, needed)} wide; {need}"
+            return f"too narrow to get in; {need}"
         target = max(inner, key=lambda p: float(p.area)).representative_point()
         home = self._space.polygon.representative_point()
         low, high = 0.004, self._space.clearance
@@ -68,7 +70,7 @@ class _Passages:
                 low = middle
             else:
                 high = middle
-        return f"behind a passage of {2 * low:.2f} m, {need}"
+        return f"behind a passage of {_less(2 * low, needed)}; {need}"
 
     def _joined(self, clearance: float, a: shapely.Point, b: shapely.Point) -> bool:
         """Whether a robot of that clearance gets from ``a`` to ``b``."""
@@ -78,6 +80,11 @@ class _Passages:
                 free = free.difference(self._space.lines.buffer(clearance, quad_segs=4))
             self._levels[clearance] = polygons(free)
         return any(part.intersects(a) and part.intersects(b) for part in self._levels[clearance])
+
+
+def _less(width: float, needed: float) -> str:
+    """A width in words that does not seem enough where it is not."""
+    return in_words(min(round(width, 2), needed - 0.001))
 
 
 def _without_holes(piece: Polygon) -> list[Polygon]:

@@ -103,7 +103,7 @@ def test_a_start_too_near_to_a_wall() -> None:
     site = maps.NAMED["room"]()
     plan = plan_scan(site, PlanOptions(start=Start(0.15, 2.0)))
     assert plan.path[0] == pytest.approx((0.2, 2.0), abs=0.001)
-    assert any("begins 5.0 cm away" in note for note in plan.notes)
+    assert any("begins 5 cm away" in note for note in plan.notes)
     with pytest.raises(PlanError, match="does not fit at the start"):
         plan_scan(site, PlanOptions(start=Start(0.02, 2.0)))
     with pytest.raises(PlanError, match="not on the floor"):
@@ -114,7 +114,7 @@ def test_what_cannot_be_reached_is_said_with_the_reason() -> None:
     site = maps.office()
     plan = plan_scan(site, PlanOptions(min_turn_radius=0))
     (piece,) = plan.unreachable
-    assert piece.reason == "behind a passage of 0.35 m, the robot needs 0.40 m"
+    assert piece.reason == "behind a passage of 35 cm; the robot needs 40 cm"
     room = Polygon(piece.polygon)
     # The room behind the 35 cm door, and of its wall not more than the door lets in.
     assert room.contains(Polygon([(4.1, 0.1), (7.9, 0.1), (7.9, 2.7), (4.1, 2.7)]))
@@ -172,7 +172,7 @@ def test_the_same_twice() -> None:
 
 
 def test_a_robot_that_fits_nowhere() -> None:
-    with pytest.raises(PlanError, match=r"passages of 0\.4 m"):
+    with pytest.raises(PlanError, match=r"passages of 40 cm"):
         plan_scan(maps.site(maps.box(0, 0, 5, 0.3)), PlanOptions())
     plan = plan_scan(maps.NAMED["tight"](), PlanOptions())
     assert plan.predicted.coverage > 0.9

@@ -33,6 +33,8 @@ BEGIN = 0.80
 """So far before the place of conflict a detour begins."""
 LOOK = 2.0
 """So much of the path ahead is checked for conflicts, metres."""
+ASTRAY = 0.10
+"""Farther from its path than this the plan says nothing about walls, metres."""
 COME_AWAY = 0.6
 """Metres from where it first had to stand; nearer it still counts as blocked."""
 FIRST_REJOIN = 1.6
@@ -111,6 +113,14 @@ class ObstacleAvoidance:
         self._last = STAND
         self.reason = ""
 
+    def take_up(self) -> None:
+        """It goes on after a pause: what it waited for before does not count any more."""
+        self._standing_since = self._blocked_since = None
+        self._planned_at = -math.inf
+        self._last = STAND
+        if self._detour is not None:
+            self._detour.take_up()
+
     def blocked_for(self, now: float) -> float:
         """Seconds since the robot last got ahead; 0 unless something is in the way."""
         return 0.0 if self._blocked_since is None else now - self._blocked_since
@@ -137,7 +147,8 @@ class ObstacleAvoidance:
         pose = estimate.pose
         self._memory.observe(now, pose, readings, estimate.position_sigma, estimate.heading_sigma)
         command = self._choose(now, dt, pose, tracker)
-        if not self._safe(pose, command):
+        astray = abs(tracker.deviation) > ASTRAY
+        if not self._safe(pose, command, astray):
             self.reason = "Waiting: something is too close ahead."
             command = DriveCommand(0.0, command.steering)
         self._watch(now, pose, command)
@@ -215,16 +226,17 @@ class ObstacleAvoidance:
         nearest = self._gaps(np.array([pose.position]))[0]
         return bool(nearest < 0.8)
 
-    def _safe(self, pose: Pose2D, command: DriveCommand) -> bool:
+    def _safe(self, pose: Pose2D, command: DriveCommand, astray: bool) -> bool:
         """Whether the robot could still stop in time after another moment of this command.
 
         Before obstacles always; before walls where it is not on its planned path.
         """
         bodies = [one.body for one in self._memory.obstacles]
-        if command.speed == 0 or not (bodies or self.active):
+        astray = astray or self.active
+        if command.speed == 0 or not (bodies or astray):
             return True
         discs = Scenery([], bodies)
-        walls = self._scenery.near(pose.position, 1.0) if self.active else Scenery()
+        walls = self._scenery.near(pose.position, 1.0) if astray else Scenery()
         speed = abs(command.speed)
         reach = 0.06 + speed * 0.2 + speed**2 / (2 * self._vehicle.max_acceleration)
         curvature = math.tan(command.steering) / self._vehicle.wheelbase

@@ -130,6 +130,32 @@ class PathTracker:
         self._distance = 0.0
         self._roll(rolling)
 
+    def take_up(self) -> None:
+        """The robot has stood since the last update: begin again from where it is."""
+        self._hold = 0.0
+        self._speed = 0.0
+        self._mark, self._idle_way = self._along, 0.0
+
+    def cut_short(self, most: float) -> bool:
+        """Leave out the rest of a forward stretch if that is at most ``most`` metres.
+
+        For a robot that is held before a wall: it goes on with the next stretch, backward, or is
+        done. Says whether it did.
+        """
+        if self.done:
+            return False
+        stretch = self._stretches[self._index]
+        if stretch.gear < 0 or stretch.length - self._along > most:
+            return False
+        self._index += 1
+        self._speed = 0.0
+        if self._index == len(self._stretches):
+            self._target = self._end
+        else:
+            self._along = 0.0
+            self._begin_stretch(standing=True)
+        return True
+
     def path_ahead(
         self, horizon: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int8]]:

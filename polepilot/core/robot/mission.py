@@ -31,6 +31,13 @@ LOOK_TIME = 15.0
 """Seconds: two sweeps of the camera. Standing longer shows nothing new."""
 SWEEP_STEP = 0.02
 """The swept area grows by strokes of at least this length, metres."""
+GAP = 0.3
+"""Seconds without driving after which the robot begins again from standing."""
+HELD_PATIENCE = 0.6
+"""So long the board may hold the robot before a wall until that counts, seconds."""
+HELD_REST = 0.08
+"""Metres that the board may cut off the end of a stretch: it keeps more room ahead of the body
+than a plan has to."""
 JUMP = 0.5
 """A pose that moves farther than this between two ticks was corrected, not driven; metres."""
 
@@ -88,6 +95,8 @@ class Mission:
         self._swept = None if plan.area.is_empty else SweptArea(plan.area, plan.tool_width)
         self._stroke_from: Point | None = None
         self._last: Pose2D | None = None
+        self._driven_at = now
+        self._held_since: float | None = None
         self._travelled = 0.0
 
     @property
@@ -116,12 +125,44 @@ class Mission:
         dt: float,
         estimate: PoseEstimate,
         proximity: tuple[float | None, float | None, float | None],
+        held: bool = False,
     ) -> Step:
-        """The command that follows the plan from ``estimate``, round obstacles."""
+        """The command that follows the plan from ``estimate``, round obstacles.
+
+        Args:
+            held: the board lets no wheel turn forward, because something is too close ahead.
+        """
+        if now - self._driven_at > GAP:
+            self.take_up()
+        self._driven_at = now
         if hold := self._too_blind(now, estimate):
             return Step(STAND, self._tracker.target, hold)
         command = self._avoidance.update(now, dt, estimate, proximity, self._tracker)
-        return Step(command, self._avoidance.target or self._tracker.target, self._avoidance.reason)
+        target = self._avoidance.target or self._tracker.target
+        if hold := self._too_close(now, command, held):
+            return Step(STAND, target, hold)
+        return Step(command, target, self._avoidance.reason)
+
+    def take_up(self) -> None:
+        """It goes on after standing for a while: nothing that was waited for counts any more."""
+        self._blind_since = self._held_since = None
+        self._tracker.take_up()
+        self._avoidance.take_up()
+
+    def _too_close(self, now: float, command: DriveCommand, held: bool) -> str:
+        """Why it waits for the board, which holds it; at the end of a stretch it does not."""
+        if not held or command.speed <= 0:
+            self._held_since = None
+            return ""
+        if self._held_since is None:
+            self._held_since = now
+        if now - self._held_since < HELD_PATIENCE:
+            return ""
+        if not self._avoidance.active and self._tracker.cut_short(HELD_REST):
+            self._held_since = None
+            return ""
+        self._tracker.take_up()
+        return "Waiting: something stands closer ahead than the robot may drive to."
 
     def _too_blind(self, now: float, estimate: PoseEstimate) -> str:
         """Why it should wait for a landmark: a wall may be nearer than the pose is certain."""
@@ -141,7 +182,8 @@ class Mission:
 
     def blocked_for(self, now: float) -> float:
         """Seconds that an obstacle has kept it standing."""
-        return self._avoidance.blocked_for(now)
+        held = 0.0 if self._held_since is None else now - self._held_since
+        return max(held, self._avoidance.blocked_for(now))
 
     def forget_obstacles(self) -> None:
         """The pose was found anew: what was remembered about obstacles hangs on the old one."""

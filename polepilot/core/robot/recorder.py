@@ -29,6 +29,9 @@ CHUNK_BYTES = 32 * 1024
 PICTURE_PERIOD = 1.0
 """Seconds between two recorded pictures."""
 
+MOST_WAITING = 20_000
+"""Messages (minutes of driving) that a stalled disk may be behind; then the log is given up."""
+
 _Message = tuple[str, int, bytes]
 
 
@@ -53,7 +56,7 @@ class Recorder:
         self._offset = wall_start - stamp_start
         self._queue: SimpleQueue[_Message | None] = SimpleQueue()
         self._next_picture = -1.0
-        self.error: OSError | None = None
+        self.error: Exception | None = None
         """Why the log is incomplete, once writing has failed (a full disk, say)."""
         path.parent.mkdir(parents=True, exist_ok=True)
         self._thread = threading.Thread(target=self._write_all, name="recorder", daemon=True)
@@ -143,6 +146,8 @@ class Recorder:
             self._thread.join()
 
     def _put(self, channel: str, stamp: float, document: dict[str, Any]) -> None:
+        if self._queue.qsize() > MOST_WAITING:
+            self.error = self.error or OSError("the disk does not keep up")
         if self.error is None:
             data = json.dumps(document, separators=(",", ":")).encode()
             self._queue.put((channel, max(0, int((stamp + self._offset) * 1e9)), data))
@@ -160,7 +165,7 @@ class Recorder:
                         channels[name] = writer.register_channel(name, "json", schema)
                     writer.add_message(channels[name], nanoseconds, data, nanoseconds)
                 writer.finish()  # type: ignore[no-untyped-call]
-        except OSError as error:
+        except Exception as error:  # noqa: BLE001 - the robot drives on, and says so
             self.error = error
 
 

@@ -9,43 +9,49 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from polepilot.core.command import STAND, DriveCommand
 from polepilot.core.control.supervisor import Limits, Supervisor, Verdict
-from polepilot.core.errors import CameraError, LinkError, RefusedError
+from polepilot.core.errors import CameraError, RefusedError
 from polepilot.core.geometry import Point
 from polepilot.core.link.calibration import DriveCalibration
-from polepilot.core.link.messages import Features
-from polepilot.core.link.protocol import HostLink, LinkState, TelemetrySample
+from polepilot.core.link.messages import Faults, Features
+from polepilot.core.link.protocol import LinkState, TelemetrySample
 from polepilot.core.localization.localizer import Localizer, LocalizerSettings
-from polepilot.core.observation import PanReading, PoseEstimate, RangeBearing, Status
+from polepilot.core.observation import (
+    Odometry,
+    PanReading,
+    PoseEstimate,
+    RangeBearing,
+    Status,
+)
 from polepilot.core.plan import Plan
 from polepilot.core.robot.gaze import Gaze
+from polepilot.core.robot.journal import Journal
+from polepilot.core.robot.line import Line
 from polepilot.core.robot.mission import Mission, Outcome, RunSummary
 from polepilot.core.robot.pan import PanSweep, PanTrack
 from polepilot.core.robot.ports import LinkPort, SensorPort, Sighting
+from polepilot.core.robot.readiness import require_ready
 from polepilot.core.robot.recorder import Recorder
 from polepilot.core.robot.servo import Servo
-from polepilot.core.robot.snapshot import Event, Level, LinkStatus, Measured, Snapshot, State
+from polepilot.core.robot.snapshot import Level, Measured, Snapshot, State
+from polepilot.core.robot.watch import Watch
 from polepilot.core.scenery import Scenery
 from polepilot.core.site import Site
 from polepilot.core.vehicle import RobotModel
 from polepilot.core.vision.measure import to_range_bearing
 
-STANDING_AFTER = 0.4
-"""Seconds without a turning wheel after which the robot counts as standing."""
 SIGHTING_PATIENCE = 0.3
 """How long a picture waits for the pan angle of its moment, seconds."""
-ARMING_PATIENCE = 2.0
-"""Seconds until a board that does not arm pauses the mission."""
 BLOCKED_PATIENCE = 30.0
 """Seconds of standing before an obstacle; then it takes a person to go on, for what is behind the
 robot is remembered only so long."""
-START_TOLERANCE = 0.5
-"""How far from the start of its plan a mission may begin, metres."""
-EVENTS_SHOWN = 20
+SILENT_AFTER = 0.27
+"""Seconds after the last telemetry from when on the wheels stand: the board's own deadline is
+0.25 s, and the supervisor sends no speed without telemetry."""
 
 _LEVELS: dict[str, Level] = {
     "lost": "fault",
@@ -54,15 +60,6 @@ _LEVELS: dict[str, Level] = {
     "landmark_unknown": "warning",
 }
 """How bad the localizer's events are; the others are for information."""
-
-_DISARMED: dict[LinkState, str] = {
-    LinkState.CLOSED: "Stopped: the line to the microcontroller is gone. Plug it in, then Resume.",
-    LinkState.CONNECTING: "Stopped: the microcontroller does not answer. Check its power, Resume.",
-    LinkState.IDLE: "Stopped: the microcontroller is not armed. Resume arms it.",
-    LinkState.LINK_LOST: "Stopped: the microcontroller missed the computer for a moment. Resume.",
-    LinkState.ESTOP: "Stopped: the button on the robot is pressed.",
-}
-"""Why a mission is paused when the board is no longer armed."""
 
 Ranges = tuple[float | None, float | None, float | None]
 
@@ -92,9 +89,10 @@ class Robot:
         self.on_run_ended: Callable[[RunSummary], None] | None = None
         """Called in the robot's thread when a mission is over."""
         self._sensor = sensor
-        self._port = link
         self._stopwatch = stopwatch
-        self._host = HostLink()
+        self._journal = Journal()
+        self._line = Line(link, self._journal)
+        self._host = self._line.host
         self._supervisor = Supervisor(settings.limits, settings.model.vehicle)
         pan = settings.model.pan
         self._pan = PanTrack()
@@ -107,14 +105,11 @@ class Robot:
         self._mission: Mission | None = None
         self._paused: str | None = None
         self._was_fixed = False
-        self._armed = False
-        """Since somebody asked for it last."""
-        self._asked = 0.0
+        self._watch = Watch()
 
-        self._generation = link.generation
         self._now = 0.0
         self._last_tick: float | None = None
-        self._last_moving = 0.0
+        self._odometry = Odometry(0.0, 0.0, 0.0)
         self._waiting: deque[Sighting] = deque(maxlen=8)
         self._looks_from = 0.0
         """Pictures from before the present map was loaded are not looked at."""
@@ -125,9 +120,6 @@ class Robot:
         self._hold = ""
         self._target: Point | None = None
         self._seq = 0
-        self._events: deque[Event] = deque(maxlen=EVENTS_SHOWN)
-        self._event_seq = 0
-        self._faults: dict[str, str] = {}
 
     # ---- what people ask for -----------------------------------------------------------------
 
@@ -182,11 +174,15 @@ class Robot:
             RefusedError: no site, too few landmarks, a mission under way, a latched stop, no link,
                 or the plan starts elsewhere. The recorder stays the caller's then.
         """
-        site = self._startable(plan)
-        self._arm()
-        self._mission = Mission(run_id, plan, site, self.settings.model, recorder, self._now)
-        self._paused = None
+        site = require_ready(
+            plan, self._site, self._mission is not None, self._host, self._estimate
+        )
+        mission = Mission(run_id, plan, site, self.settings.model, recorder, self._now)
         recorder.begin(self._now, site, plan)
+        self._arm()
+        self._mission = mission
+        self._journal.on_event = recorder.event
+        self._paused = None
         what = "Scanning the area" if plan.mode == "scan" else "Tracking the route"
         self._say("mission_started", "info", f"{what}: {plan.predicted.length:.1f} m.")
 
@@ -207,8 +203,9 @@ class Robot:
         Raises:
             RefusedError: nothing is under way, a latched stop, or no link.
         """
-        self._require_mission()
+        mission = self._require_mission()
         self._arm()
+        mission.take_up()
         self._paused = None
         self._say("mission_resumed", "info", "Going on.")
 
@@ -239,21 +236,35 @@ class Robot:
     def shutdown(self, now: float) -> None:
         """Wheels still, log closed, ports closed. The last call."""
         self._now = now
-        if self._mission is not None:
-            self._finish("paused", "The service was stopped before it was done.", wait=True)
         self._host.disarm()
-        self._host.drive(0, 0, 0)
         self._host.pan(0)
         self._host.estop()
-        self._write(now)
-        self._port.close()
-        self._sensor.close()
+        self._line.write(now)
+        try:
+            if self._mission is not None:
+                # A slow disk may take its time now that the wheels stand.
+                self._finish("paused", "The service was stopped before it was done.", wait=True)
+        finally:
+            self._line.close()
+            self._sensor.close()
 
     # ---- the tick ----------------------------------------------------------------------------
 
     def step(self, now: float) -> Snapshot:
-        """One tick at robot time ``now``."""
-        dt = 0.0 if self._last_tick is None else now - self._last_tick
+        """One tick at robot time ``now``.
+
+        Whatever goes wrong in it, the wheels do not wait for the next one: the stop is on its way
+        before the error is.
+        """
+        try:
+            return self._tick(now)
+        except Exception:
+            self._host.estop()
+            self._line.write(now)
+            raise
+
+    def _tick(self, now: float) -> Snapshot:
+        dt = 0.0 if self._last_tick is None else max(0.0, now - self._last_tick)
         self._now = self._last_tick = now
         marks = [self._stopwatch()]
         self._sample(now)
@@ -266,35 +277,26 @@ class Robot:
         marks.append(self._stopwatch())
         snapshot = self._publish(now, marks)
         if self._mission is not None:
-            self._mission.recorder.snapshot(snapshot)
+            recorder = self._mission.recorder
+            recorder.snapshot(snapshot)
+            if recorder.error is not None:
+                self._trouble("log", f"The log of this run is incomplete: {recorder.error}.")
         return snapshot
 
     def _sample(self, now: float) -> None:
         """Bytes and pictures that have come."""
-        try:
-            chunks = self._port.read()
-            if self._port.generation != self._generation:
-                self._generation = self._port.generation
-                self._host.reset(now)
-            for chunk in chunks:
-                self._host.receive(chunk.data, chunk.stamp)
-            if self._host.ready:
-                self._clear_fault("link")
-        except LinkError as error:
-            self._host.port_lost(now, str(error))
-            self._fault("link", str(error))
-        for sample in self._host.samples():
+        for sample in self._line.read(now):
             self._take_telemetry(sample)
-        for event in self._host.events():
-            level: Level = "info" if event.state in (LinkState.IDLE, LinkState.ARMED) else "warning"
-            self._say(f"link_{event.code}", level, event.message)
+        self._notice_silence(now)
         try:
             sighting = self._sensor.read()
-            self._clear_fault("camera")
         except CameraError as error:
             sighting = None
-            self._fault("camera", str(error))
-        if sighting is not None and sighting.stamp >= self._looks_from:
+            self._trouble("camera", str(error))
+        if sighting is None:
+            return
+        self._journal.over("camera")
+        if sighting.stamp >= self._looks_from:
             self._sighting = sighting
             self._waiting.append(sighting)
 
@@ -308,11 +310,22 @@ class Robot:
         odometry = self.settings.calibration.to_odometry(
             telemetry, sample.stamp, previous, self._host.features
         )
-        odometry = self._servo.follow(odometry)
+        odometry = self._odometry = self._servo.follow(odometry)
         if odometry.speed != 0.0:
-            self._last_moving = sample.stamp
+            self._watch.moved(sample.stamp)
         if self._localizer is not None:
             self._localizer.add_odometry(odometry)
+        self._journal.board_faults(self._now, telemetry.faults)
+
+    def _notice_silence(self, now: float) -> None:
+        """What the board said last does not hold for ever: without the line the wheels stand."""
+        age = self._host.telemetry_age(now)
+        if self._odometry.speed == 0.0 or age is None or age < SILENT_AFTER:
+            return
+        stamp = self._odometry.stamp + SILENT_AFTER
+        self._odometry = replace(self._odometry, stamp=stamp, speed=0.0)
+        if self._localizer is not None:
+            self._localizer.add_odometry(self._odometry)
 
     def _locate(self, now: float) -> None:
         """The pose from everything sensed until now."""
@@ -327,7 +340,7 @@ class Robot:
             self._waiting.popleft()
             if angle is not None:
                 self._use(sighting, angle, localizer)
-        if localizer.status is Status.LOST and self._standing(now):
+        if localizer.status is Status.LOST and self._watch.standing(now):
             localizer.refix(localizer.reason)
         self._estimate = localizer.estimate(now)
         for event in localizer.events():
@@ -346,21 +359,26 @@ class Robot:
     def _decide(self, now: float, dt: float) -> DriveCommand:
         """What the mission wants; standing still wherever that is in doubt."""
         mission = self._mission
+        kept_by = self._state()[1]
         self._hold = ""
         self._target = None
+        estimate = self._estimate
+        known = estimate is not None and estimate.status in (Status.TRACKING, Status.DEGRADED)
+        self._was_fixed = self._was_fixed or known
         if mission is None:
             return STAND
-        estimate = self._estimate
-        if estimate is not None and estimate.status in (Status.TRACKING, Status.DEGRADED):
-            self._was_fixed = True
+        if estimate is not None and known:
             mission.observe(estimate.pose)
         self._target = mission.target
-        self._watch_board(now)
+        if self._paused is None:
+            objection = self._watch.objection(now, self._host.state, kept_by)
+            if objection is not None:
+                self.pause(objection)
         if self._paused is not None or self._host.state is not LinkState.ARMED:
             return STAND
         if estimate is None or estimate.status in (Status.FIXING, Status.LOST):
             return STAND
-        step = mission.drive(now, dt, estimate, self._proximity())
+        step = mission.drive(now, dt, estimate, self._proximity(), self._held())
         self._target, self._hold = step.target, step.hold
         if mission.done:
             self._finish("done", "The whole path was driven.")
@@ -374,14 +392,6 @@ class Robot:
             )
             return STAND
         return step.command
-
-    def _watch_board(self, now: float) -> None:
-        """Whatever ends the arming ends the drive: it takes a person to go on."""
-        state = self._host.state
-        if state is LinkState.ARMED:
-            self._armed = True
-        elif self._paused is None and (self._armed or now - self._asked > ARMING_PATIENCE):
-            self.pause(_DISARMED[state])
 
     def _act(self, now: float, wanted: DriveCommand) -> None:
         """The supervisor has the last word; then bytes go out."""
@@ -400,16 +410,7 @@ class Robot:
                 between = self._gaze.between(now, self._estimate.pose, self._sweep.turns)
             rate = self._sweep.rate(None if latest is None else latest.angle, between)
         self._host.pan(round(1000 * rate))
-        self._write(now)
-
-    def _write(self, now: float) -> None:
-        try:
-            data = self._host.poll(now)
-            if data:
-                self._port.write(data)
-        except LinkError as error:
-            self._host.port_lost(now, str(error))
-            self._fault("link", str(error))
+        self._line.write(now)
 
     def _publish(self, now: float, marks: list[float]) -> Snapshot:
         self._seq += 1
@@ -434,11 +435,11 @@ class Robot:
             pan=None if latest is None else latest.angle,
             proximity=self._proximity(),
             battery=battery,
-            link=self._link_status(now),
+            link=self._line.status(now),
             detections=() if sighting is None else sighting.detections,
             detections_stamp=None if sighting is None else sighting.stamp,
             mission=None if self._mission is None else self._mission.status(now),
-            events=tuple(self._events),
+            events=self._journal.events,
             durations=(sample, locate, decide, act, publish),
         )
 
@@ -447,7 +448,7 @@ class Robot:
     def _state(self) -> tuple[State, str]:
         """One word and why."""
         localizer = self._localizer
-        if self._host.state is LinkState.ESTOP:
+        if self._line.stopped:
             return State.STOPPED, self._paused or "Emergency stop. Release it to go on."
         if localizer is None:
             return State.IDLE, "No map is loaded."
@@ -459,66 +460,19 @@ class Robot:
             return State.READY, localizer.reason
         return State.RUNNING, self._hold or self._verdict.reason
 
-    def _standing(self, now: float) -> bool:
-        return now - self._last_moving > STANDING_AFTER
-
     def _proximity(self) -> Ranges:
         if self._telemetry is None or not self._host.features & Features.PROXIMITY:
             return (None, None, None)
         return self._telemetry.telemetry.ranges
 
-    def _link_status(self, now: float) -> LinkStatus:
-        statistics = self._host.statistics
-        trip = statistics.best_round_trip_ms
-        return LinkStatus(
-            state=self._host.state.value,
-            age=self._host.telemetry_age(now),
-            sent=statistics.sent,
-            lost=statistics.lost,
-            crc_errors=statistics.crc_errors,
-            round_trip=None if trip is None else trip / 1000,
-        )
-
-    def _startable(self, plan: Plan) -> Site:
-        site = self._site
-        if site is None:
-            raise RefusedError("No map is loaded.", remedy="Choose one.", code="no_site")
-        if len(site.landmarks) < 2:
-            raise RefusedError(
-                f"The site has {len(site.landmarks)} landmark(s), and the robot needs two to know "
-                "where it is.",
-                remedy="Place at least two landmarks.",
-                code="no_landmarks",
-            )
-        if self._mission is not None:
-            raise RefusedError(
-                "A mission is already under way.", remedy="End it first.", code="mission_active"
-            )
-        if self._host.state is LinkState.ESTOP:
-            raise RefusedError(
-                "The emergency stop is latched.", remedy="Release it first.", code="estop_latched"
-            )
-        if not self._host.ready:
-            raise RefusedError(
-                "The microcontroller does not answer.",
-                remedy="Check the cable and its power.",
-                code="link_not_ready",
-            )
-        estimate = self._estimate
-        if estimate is not None:
-            distance = estimate.pose.distance_to((float(plan.path[0][0]), float(plan.path[0][1])))
-            if distance > START_TOLERANCE:
-                raise RefusedError(
-                    f"The plan starts {distance:.2f} m from where the robot stands.",
-                    remedy="Plan again from here.",
-                    code="elsewhere",
-                )
-        return site
+    def _held(self) -> bool:
+        """Whether the board lets no wheel turn forward: something is too close ahead."""
+        sample = self._telemetry
+        return sample is not None and Faults.PROXIMITY_STOP in sample.telemetry.faults
 
     def _arm(self) -> None:
         self._host.arm()
-        self._armed = False
-        self._asked = self._now
+        self._watch.asked(self._now)
 
     def _require_mission(self) -> Mission:
         if self._mission is None:
@@ -534,23 +488,14 @@ class Robot:
         self._say("mission_ended", level, reason)
         mission.recorder.result(self._now, summary.to_json())
         mission.recorder.close(wait=wait)
+        self._journal.on_event = lambda _: None
         self._mission = None
         self._paused = None
         if self.on_run_ended is not None:
             self.on_run_ended(summary)
 
-    def _fault(self, source: str, text: str) -> None:
-        """Say a lasting trouble once, not fifty times a second."""
-        if self._faults.get(source) != text:
-            self._faults[source] = text
-            self._say(f"{source}_fault", "fault", text)
-
-    def _clear_fault(self, source: str) -> None:
-        self._faults.pop(source, None)
+    def _trouble(self, source: str, text: str) -> None:
+        self._journal.trouble(self._now, source, text)
 
     def _say(self, code: str, level: Level, text: str) -> None:
-        self._event_seq += 1
-        event = Event(self._event_seq, self._now, code, level, text)
-        self._events.append(event)
-        if self._mission is not None:
-            self._mission.recorder.event(event)
+        self._journal.say(self._now, code, level, text)

@@ -46,6 +46,16 @@ _CODES = {
     415: "unsupported_media_type",
 }
 
+_REMEDIES = {
+    403: "Use our own page, at the address that the service printed.",
+    404: "Look at the list of what there is.",
+    405: "Look into /openapi.json for what this address takes.",
+    413: "Send less at once.",
+    422: "Mend what is named and send it again.",
+    503: "Wait a moment and try again.",
+}
+"""What to do where an error itself does not say so."""
+
 log = structlog.get_logger("polepilot.server")
 
 
@@ -87,7 +97,7 @@ def problem(
         "status": status,
         "detail": detail,
         "code": code,
-        "remedy": remedy,
+        "remedy": remedy or _REMEDIES.get(status, ""),
     }
     if where is not None and all(map(math.isfinite, where)):
         document["where"] = list(where)
@@ -139,7 +149,10 @@ async def _on_http_error(_: Request, error: Exception) -> JSONResponse:
         # FastAPI's word for a body that is not even text.
         return problem(422, "the body is not JSON.", code="bad_json")
     code = _CODES.get(error.status_code, "http_error")
-    return problem(error.status_code, str(error.detail), code=code, headers=error.headers)
+    detail = str(error.detail)
+    if error.status_code == 405:
+        detail = "This address does not take that method."
+    return problem(error.status_code, detail, code=code, headers=error.headers)
 
 
 async def _on_unknown_error(request: Request, error: Exception) -> JSONResponse:

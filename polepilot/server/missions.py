@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -12,7 +13,9 @@ import structlog
 from starlette.concurrency import run_in_threadpool
 
 from polepilot.core.errors import PlanError, PolepilotError, RefusedError, SiteError
+from polepilot.core.geometry import wrap_angle
 from polepilot.core.robot.recorder import Recorder
+from polepilot.core.sim.world import start_of
 from polepilot.core.site import Site, parse_site
 from polepilot.server.convert import Job, coordinates_of, plan_of
 from polepilot.server.planner import Planner
@@ -22,9 +25,12 @@ from polepilot.server.schemas import PlanRequest
 from polepilot.server.store import Once, PlanRow, RunRow, SiteRow, Store
 
 if TYPE_CHECKING:
+    from polepilot.core.plan import Plan
     from polepilot.core.robot.mission import RunSummary
 
 LEAST_LANDMARKS = 2
+_MOST_TURNED = math.radians(45)
+"""So far may the robot look aside from the way that a plan begins with."""
 _SITE_SETTING = "site"
 
 log = structlog.get_logger("polepilot.missions")
@@ -158,6 +164,10 @@ class Missions:
             if (value := getattr(wanted, key)) is not None
         }
         start = wanted.start or self._present_pose(row.id)
+        if start is None and self._twin is not None:
+            # There the simulated robot will be put when it is given this site.
+            at = await run_in_threadpool(lambda: start_of(_parse(row)))
+            start = (at.x, at.y, at.heading)
         if start is not None:
             options["start"] = list(start)
         document = await self._planner.plan(
@@ -249,6 +259,7 @@ class Missions:
                 remedy="Place at least two landmarks.",
             )
         driven = await run_in_threadpool(plan_of, plan)
+        self._refuse_if_turned(driven, plan.site_id)
         recorder = self._recorder(row.id)
         job = Job(run_id=row.id, plan_id=plan.id, site_id=plan.site_id, route=plan.route)
 
@@ -265,6 +276,21 @@ class Missions:
         except BaseException:
             await run_in_threadpool(recorder.close)
             raise
+
+    def _refuse_if_turned(self, plan: Plan, site_id: int) -> None:
+        """A plan that begins the other way round would be left within its first metre."""
+        pose = self._present_pose(site_id)
+        if pose is None:
+            return
+        (ax, ay), (bx, by) = plan.path[0], plan.path[1]
+        begins = math.atan2(by - ay, bx - ax) + (math.pi if plan.gear[0] < 0 else 0.0)
+        turned = abs(wrap_angle(begins - pose[2]))
+        if turned > _MOST_TURNED:
+            raise RefusedError(
+                f"The plan begins {math.degrees(turned):.0f}° turned from where the robot looks.",
+                remedy="Plan again from here.",
+                code="elsewhere",
+            )
 
     def _recorder(self, run_id: int) -> Recorder:
         twin, published = self._twin, self._runner.latest

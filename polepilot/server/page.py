@@ -35,13 +35,17 @@ def file_response(static: Path, path: str, accepted: str) -> Response:
     root = static.resolve()
     try:
         file = (root / name).resolve()
-        found = file.is_relative_to(root) and file.is_file()
+        # What begins with a dot is the build's own.
+        hidden = any(part.startswith(".") for part in Path(name).parts)
+        found = file.is_relative_to(root) and file.is_file() and not hidden
     except (OSError, ValueError):
         found = False
     if not found:
         if name == "index.html":
             raise NotFoundError(
-                "The page is not built.", code="page_not_built", remedy="Install again without POLEPILOT_PAGE=skip."
+                "The page is not built.",
+                code="page_not_built",
+                remedy="Install again without POLEPILOT_PAGE=skip.",
             )
         raise NotFoundError("There is nothing at this address.")
     headers = {

@@ -19,7 +19,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Subprotocol
 
-from polepilot.server.errors import BusyError
+from polepilot.server.errors import BusyError, NotFoundError
 
 if TYPE_CHECKING:
     from polepilot.server.services import Services
@@ -74,6 +74,9 @@ async def _forward(request: Request, path: str) -> Response:
         answer = await services.panel_client.send(upstream, stream=True)
     except httpx.HTTPError:
         raise _no_panel() from None
+    if answer.status_code == 404:
+        await answer.aclose()
+        raise NotFoundError("The 3D panel has nothing at this address.")
     response = StreamingResponse(
         answer.aiter_raw(), answer.status_code, background=BackgroundTask(answer.aclose)
     )

@@ -17,6 +17,8 @@ StartPlace = Place | tuple[Coordinate, Coordinate, Coordinate]
 Coordinates = list[list[list[Place]]]
 """Of a GeoJSON MultiPolygon: polygons, each a list of rings, the first of them the outer one."""
 Id = Annotated[int, Field(ge=1, le=2**53 - 1)]
+StrictId = Annotated[int, Field(strict=True, ge=1, le=2**53 - 1)]
+"""In a body, where a number is a number: neither "1" nor true."""
 Mode = Literal["scan", "route"]
 
 
@@ -171,7 +173,7 @@ class SiteCheck(Model):
 class PlanRequest(Request):
     """What is not given comes from the vehicle's settings."""
 
-    site_id: Id
+    site_id: StrictId
     mode: Mode
     route: Annotated[str, Field(max_length=200)] | None = None
     """Name of the route, for mode `route`."""
@@ -180,7 +182,7 @@ class PlanRequest(Request):
     min_turn_radius: Annotated[FiniteFloat, Field(ge=0, le=1000)] | None = None
     start: StartPlace | None = None
     order: Literal["default", "paper"] | None = None
-    pending_of: Id | None = None
+    pending_of: StrictId | None = None
     """Plan only what this run left uncovered, from where the robot stands now."""
 
 
@@ -229,7 +231,7 @@ class PlanRecord(Model):
 
 
 class MissionRequest(Request):
-    plan_id: Id
+    plan_id: StrictId
 
 
 class RunRecord(Model):
@@ -400,7 +402,7 @@ class Snapshot(Model):
 
 
 class SiteChoice(Request):
-    site_id: Id
+    site_id: StrictId
 
 
 # simulation

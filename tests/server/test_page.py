@@ -23,6 +23,7 @@ def page(tmp_path: Path) -> TestClient:
     (static / "assets" / "index-abc123.js").write_bytes(script)
     (static / "assets" / "index-abc123.js.gz").write_bytes(gzip.compress(script))
     (static / "icon.svg").write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")
+    (static / ".source-hash").write_text("0123")
     (tmp_path / "secret.txt").write_text("secret")
     app = FastAPI()
     errors.install(app)
@@ -77,3 +78,8 @@ def test_a_page_that_was_not_built(tmp_path: Path) -> None:
     mount_page(app, tmp_path / "nowhere")
     answer = TestClient(app).get("/")
     assert (answer.status_code, answer.json()["code"]) == (404, "page_not_built")
+
+
+def test_what_the_build_keeps_for_itself_is_not_served(page: TestClient) -> None:
+    assert page.get("/.source-hash").status_code == 404
+    assert page.get("/assets/../.source-hash").status_code == 404

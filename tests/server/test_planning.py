@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import os
 import signal
 import time
@@ -68,6 +69,35 @@ def test_a_plan_begins_where_the_robot_stands(
     assert elsewhere["path"][0] == [1.0, 1.0]
 
 
+def test_a_plan_for_another_site_begins_as_the_simulated_robot_will_stand_there(
+    client: TestClient, square: int
+) -> None:
+    """A drawn start has no heading; the robot is put there looking along x."""
+    # The first wall to scan along is on the left of this start: a free heading would begin west.
+    other = client.post(f"{API}/sites", json={**SQUARE, "start": [1, 1.2]}).json()["id"]
+    plan = client.post(f"{API}/plans", json={"site_id": other, "mode": "scan"}).json()
+    (ax, ay), (bx, by) = plan["path"][:2]
+    assert [ax, ay] == [1.0, 1.2]
+    along = (bx - ax) * plan["gear"][0]
+    assert along > 0
+    assert abs(by - ay) < 0.5 * along
+
+
+def test_a_plan_that_begins_the_other_way_round_is_refused(
+    client: TestClient, robot: FakeRobot, square: int
+) -> None:
+    plan = client.post(f"{API}/plans", json={"site_id": square, "mode": "scan"}).json()
+    robot.pose = Pose2D(1.0, 1.0, math.pi)
+    client.post(f"{API}/robot/clear")
+    refused = client.post(f"{API}/missions", json={"plan_id": plan["id"]})
+    assert refused.status_code == 409, refused.text
+    assert refused.json()["code"] == "elsewhere"
+    assert "turned" in refused.json()["detail"]
+    assert client.get(f"{API}/runs").json() == []
+    again = client.post(f"{API}/plans", json={"site_id": square, "mode": "scan"}).json()
+    assert client.post(f"{API}/missions", json={"plan_id": again["id"]}).status_code == 201
+
+
 @pytest.mark.parametrize(
     ("changes", "status", "word"),
     [
@@ -81,6 +111,8 @@ def test_a_plan_begins_where_the_robot_stands(
         ({"tool_width": 0.001}, 422, "tool_width"),
         ({"clearance": -0.1}, 422, "clearance"),
         ({"width": 1}, 422, "width"),
+        ({"site_id": True}, 422, "site_id"),
+        ({"site_id": "1"}, 422, "site_id"),
         ({"pending_of": 9}, 404, "run"),
     ],
 )

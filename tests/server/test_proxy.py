@@ -71,6 +71,8 @@ class FakePanel:
         self.requests.append(request)
         if "Upgrade" in request.headers:
             return None
+        if request.path.startswith("/nothing"):
+            return connection.respond(HTTPStatus.NOT_FOUND, "")
         answer = connection.respond(HTTPStatus.OK, f"page {request.path}")
         answer.headers["X-Panel"] = "yes"
         return answer
@@ -108,6 +110,9 @@ def test_pages(serve: Callable[..., Running], panel: FakePanel) -> None:
         answer.headers["content-security-policy"]
     )
     assert "Cookie" not in panel.requests[-1].headers
+    missing = httpx.get(f"{running.url}/viser/nothing")
+    assert missing.status_code == 404
+    assert missing.json()["code"] == "not_found"
     assert panel.requests[-1].headers["Host"] == f"127.0.0.1:{panel.port}"
     assert httpx.get(f"{running.url}/viser").headers["location"] == "/viser/"
     assert panel.sites[0].name == "Demo workshop"

@@ -125,10 +125,13 @@ class TestSites:
             (b'{"boundary": [[0, NaN]]}', "bad_input"),
             (b'{"boundary": [[0, 0], [1e999, 0], [1, 1]]}', "bad_site"),
             (b'{"boundary": "no"}', "bad_site"),
+            (b'{"name": "\\ud800", "boundary": [[0, 0], [4, 0], [4, 3]]}', "bad_input"),
         ],
     )
     def test_what_is_no_site_is_refused(self, client: TestClient, body: bytes, code: str) -> None:
-        problem(client.post(f"{API}/sites", content=body), 422, code)
+        document = problem(client.post(f"{API}/sites", content=body), 422, code)
+        assert document["remedy"]
+        assert "unicode" not in document["detail"]
 
     def test_geojson_comes_back_the_same(self, client: TestClient) -> None:
         record = add_square(client)

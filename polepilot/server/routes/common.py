@@ -46,6 +46,16 @@ else:
     ServicesDep = Annotated[Any, Depends(get_services)]
 
 
+_JSON_NAMES = {
+    list: "list",
+    str: "text",
+    int: "number",
+    float: "number",
+    bool: "truth value",
+    type(None): "null",
+}
+
+
 def _refuse_constant(name: str) -> float:
     raise InputError(f"the body holds {name}: expected numbers that JSON knows.")
 
@@ -58,11 +68,18 @@ async def json_object(request: Request) -> dict[str, Any]:
     """
     try:
         document = json.loads(await request.body(), parse_constant=_refuse_constant)
-    except (ValueError, RecursionError) as error:
+        # Half of a surrogate pair is valid JSON, but no text that could be kept or shown.
+        json.dumps(document, ensure_ascii=False).encode()
+    except RecursionError:
+        raise InputError("the body is nested too deeply.", code="bad_json") from None
+    except UnicodeEncodeError:
+        raise InputError("the body holds half a character (a lone surrogate).") from None
+    except ValueError as error:
         raise InputError(f"the body is not JSON: {error}.", code="bad_json") from None
     if not isinstance(document, dict):
         raise InputError(
-            f"the body is a JSON {type(document).__name__}: expected an object.", code="bad_json"
+            f"the body is a JSON {_JSON_NAMES[type(document)]}: expected an object.",
+            code="bad_json",
         )
     return document
 

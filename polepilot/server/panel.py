@@ -6,8 +6,6 @@ floor; with viewers, moving things go out with every update, growing things at m
 
 from __future__ import annotations
 
-import contextlib
-import io
 import logging
 import math
 import threading
@@ -17,6 +15,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+import rich
 import viser
 from numpy.typing import NDArray
 
@@ -95,8 +94,9 @@ class Panel:
             for name in ("websockets.server", "websockets"):
                 # A browser that leaves in the middle of a handshake is no event for our log.
                 logging.getLogger(name).setLevel(logging.CRITICAL)
-            with contextlib.redirect_stdout(io.StringIO()):
-                self._server = _Server(host="127.0.0.1", port=0, verbose=False)
+            # viser greets and leaves through rich's shared console, which nobody else here uses.
+            rich.get_console().quiet = True
+            self._server = _Server(host="127.0.0.1", port=0, verbose=False)
             self._build(self._server)
             if self._site is not None:
                 self._show_site(self._server, self._site)
@@ -106,8 +106,7 @@ class Panel:
         with self._lock:
             server, self._server = self._server, None
         if server is not None:
-            with contextlib.redirect_stdout(io.StringIO()):
-                server.stop()
+            server.stop()
 
     def set_site(self, site: Site) -> None:
         """Show another site; trail, points and covered floor begin anew."""

@@ -343,3 +343,13 @@ def test_a_browser_shows_poles_robot_and_covered_floor(panel: Panel, tmp_path: P
         assert page.get_by_text("Running", exact=True).is_visible()
         assert page.get_by_text("landmark 13").is_visible()
         browser.close()
+
+
+def test_the_panel_says_nothing_on_standard_output(capfd: pytest.CaptureFixture[str]) -> None:
+    panel = Panel()
+    panel.start()
+    try:
+        print("ours")
+    finally:
+        panel.stop()
+    assert capfd.readouterr().out == "ours\n"

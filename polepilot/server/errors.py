@@ -51,7 +51,7 @@ _REMEDIES = {
     404: "Look at the list of what there is.",
     405: "Look into /openapi.json for what this address takes.",
     413: "Send less at once.",
-    422: "Mend what is named and send it again.",
+    422: "Mend it and try again.",
     503: "Wait a moment and try again.",
 }
 """What to do where an error itself does not say so."""

@@ -6,10 +6,14 @@ import asyncio
 import math
 import os
 import signal
+import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
+import httpx
 import pytest
+from server.conftest import Running
 from server.fakes import SQUARE, FakeRobot, TestClient
 from shapely import MultiPolygon, box
 
@@ -214,3 +218,23 @@ class TestProcess:
                 await planner.close()
 
         asyncio.run(ask())
+
+
+def test_a_plan_that_nobody_waits_for_is_given_up(serve: Callable[..., Running]) -> None:
+    running = serve()
+    began, given_up = threading.Event(), threading.Event()
+
+    async def endless(_: Any) -> Any:
+        began.set()
+        try:
+            await asyncio.sleep(60)
+        except asyncio.CancelledError:
+            given_up.set()
+            raise
+
+    running.services.planner.plan = endless  # type: ignore[method-assign]
+    body = {"site_id": 1, "mode": "scan"}
+    with httpx.Client() as client, pytest.raises(httpx.ReadTimeout):
+        client.post(f"{running.url}{API}/plans", json=body, timeout=0.5)
+    assert began.is_set()
+    assert given_up.wait(3)

@@ -41,18 +41,21 @@ interface Options {
   body?: unknown;
   headers?: Record<string, string>;
   timeout?: number;
+  /** Ends the request before its answer. */
+  signal?: AbortSignal;
 }
 
 /** Any request of this interface. Kept replaceable for the tests. */
 export async function request<T>(path: string, options: Options = {}, fetcher = fetch): Promise<T> {
-  const { method = "GET", body, headers = {}, timeout = 15_000 } = options;
+  const { method = "GET", body, headers = {}, timeout = 15_000, signal } = options;
+  const patience = AbortSignal.timeout(timeout);
   let response: Response;
   try {
     response = await fetcher(`${BASE}${path}`, {
       method,
       headers: body === undefined ? headers : { "Content-Type": "application/json", ...headers },
       body: body === undefined ? undefined : JSON.stringify(body),
-      signal: AbortSignal.timeout(timeout),
+      signal: signal ? AbortSignal.any([signal, patience]) : patience,
       cache: "no-store",
     });
   } catch (cause) {
@@ -107,8 +110,8 @@ export const readSiteVersion = (id: number, version: number) =>
   request<SiteRecord>(`/sites/${id}/versions/${version}`);
 
 /** Planning a large site takes its time; so may the answer. */
-export const makePlan = (body: PlanRequest) =>
-  post<PlanRecord>("/plans", body, { timeout: 120_000 });
+export const makePlan = (body: PlanRequest, signal?: AbortSignal) =>
+  post<PlanRecord>("/plans", body, { timeout: 150_000, signal });
 export const readPlan = (id: number) => request<PlanRecord>(`/plans/${id}`);
 
 /** One press is one mission, however often the network repeats the request. */

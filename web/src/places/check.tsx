@@ -7,17 +7,30 @@ import { saved, site } from "../state/draft";
 import { go } from "../state/location";
 import {
   chosenRoute,
+  elsewhere,
   makePlan,
   options,
   outdated,
   plan,
+  planAgain,
   planning,
   refusal,
   routeName,
+  stopPlanning,
   waiting,
 } from "../state/plan";
 import { about, mission, snapshot, stale } from "../state/robot";
-import { Button, Choice, Empty, Fact, Facts, Figure, NumberField, Section } from "../ui/controls";
+import {
+  Busy,
+  Button,
+  Choice,
+  Empty,
+  Fact,
+  Facts,
+  Figure,
+  NumberField,
+  Section,
+} from "../ui/controls";
 
 function Options() {
   const vehicle = about.value?.model.vehicle;
@@ -150,9 +163,10 @@ function Hindrance() {
   }
   if (waiting.value !== null) {
     return (
-      <p class="hint" role="status">
-        Starts as soon as the robot has found its place. {now.reason}
-      </p>
+      <div class="hint">
+        <Busy text="The robot looks for its place, then it starts." />
+        {now.reason}
+      </div>
     );
   }
   if (now.site_id !== record.site_id) {
@@ -176,10 +190,20 @@ export function Check() {
   return (
     <>
       <Ask />
+      {planning.value && (
+        <Busy text={planning.value}>
+          <Button onClick={stopPlanning}>Stop planning</Button>
+        </Busy>
+      )}
       {refusal.value && (
-        <p class="refusal" role="alert">
+        <div class="refusal" role="alert">
           {refusal.value}
-        </p>
+          {elsewhere.value && plan.value && (
+            <div class="buttons">
+              <Button onClick={() => void planAgain()}>Plan again from here</Button>
+            </div>
+          )}
+        </div>
       )}
       {plan.value && <Hindrance />}
       {plan.value ? (

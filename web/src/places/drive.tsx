@@ -1,6 +1,6 @@
 /** Drive: where it is, whether it is safe, whether it is getting done. */
 
-import type { EventModel, Snapshot } from "../api/types";
+import type { EventModel, RobotState, Snapshot } from "../api/types";
 import {
   age as ageText,
   area,
@@ -27,6 +27,7 @@ import {
   snapshot,
   stale,
 } from "../state/robot";
+import { KIND_WORDS, POINT_KINDS } from "../state/runs";
 import { Button, Empty, Fact, Facts, Figure, Section } from "../ui/controls";
 import { CameraPicture } from "./camera";
 
@@ -40,7 +41,9 @@ function Mission({ now }: { now: Snapshot }) {
         value={percent(scan ? (job.coverage ?? job.progress) : job.progress)}
         name={scan ? "of the area covered" : `of the route “${job.route ?? ""}” driven`}
       />
-      {job.pausing_reason && <p class="hint">{job.pausing_reason}</p>}
+      {job.pausing_reason && job.pausing_reason !== now.reason && (
+        <p class="hint">{job.pausing_reason}</p>
+      )}
       <Facts>
         <Fact name="Driven">
           {length(job.travelled)} of {length(job.length)}
@@ -65,6 +68,26 @@ function ageOf(now: Snapshot, stamp: number | null | undefined): string {
   return ageText(now.stamp - stamp + (age.value ?? 0));
 }
 
+/** What a proximity sensor says; where it sees nothing it reads its range. */
+function near(reading: number | null): string {
+  const longest = about.value?.model.proximity.max_range ?? Infinity;
+  return reading !== null && reading >= longest ? `> ${length(longest)}` : length(reading);
+}
+
+/** What the marks on the map are. */
+function Legend({ now }: { now: Snapshot }) {
+  return (
+    <ul class="legend" aria-label="Marks on the map">
+      {POINT_KINDS.filter((kind) => kind !== "real" || now.real !== null).map((kind) => (
+        <li key={kind}>
+          <span class={`mark ${kind}`} aria-hidden="true" />
+          {KIND_WORDS[kind]}
+        </li>
+      ))}
+    </ul>
+  );
+}
+
 function Pose({ now }: { now: Snapshot }) {
   const { pose, real } = now;
   const apart = pose && real ? Math.hypot(pose.x - real.x, pose.y - real.y) : null;
@@ -85,7 +108,7 @@ function Pose({ now }: { now: Snapshot }) {
             ? now.detections.map((d) => `${d.id} (${length(d.range)})`).join(", ")
             : "–"}
         </Fact>
-        <Fact name="Near">{now.proximity.map((reading) => length(reading)).join(" · ")}</Fact>
+        <Fact name="Near">{now.proximity.map(near).join(" · ")}</Fact>
         <Fact name="Battery">{volts(now.battery)}</Fact>
       </Facts>
     </Section>
@@ -129,6 +152,12 @@ function Simulation({ now }: { now: Snapshot }) {
   );
 }
 
+/** What there is to say where the robot gives no reason. */
+const CALM_WORDS: Partial<Record<RobotState, string>> = {
+  ready: "It knows its place and waits for a job.",
+  running: "On its way.",
+};
+
 export function Drive() {
   const now = snapshot.value;
   if (!now) {
@@ -142,8 +171,9 @@ export function Drive() {
         <h3>{STATE_WORDS[now.state]}</h3>
         {mission.value && <Button onClick={end}>End run</Button>}
       </div>
-      <p class="state-line" title={now.reason}>
-        {now.reason}
+      {/* While it drives, the reason comes and goes: its place is kept, so that nothing moves. */}
+      <p class={`state-line ${now.state === "running" ? "" : "whole"}`} title={now.reason}>
+        {now.reason || CALM_WORDS[now.state]}
       </p>
       {stale.value && (
         <p class="hint">
@@ -164,6 +194,7 @@ export function Drive() {
       )}
       <Mission now={now} />
       <CameraPicture />
+      <Legend now={now} />
       <Pose now={now} />
       <Simulation now={now} />
       <Events now={now} />

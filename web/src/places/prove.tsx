@@ -9,10 +9,10 @@ import { go, location } from "../state/location";
 import { planPending } from "../state/plan";
 import { mission } from "../state/robot";
 import {
+  KIND_WORDS,
   missedArea,
   moment,
   POINT_KINDS,
-  type PointKind,
   run,
   runs,
   shown,
@@ -77,13 +77,6 @@ function RunList() {
     </ul>
   );
 }
-
-const KIND_WORDS: Record<PointKind, string> = {
-  real: "Real",
-  measured: "Measured",
-  estimated: "Estimated",
-  target: "Target",
-};
 
 function Toggles({ rows }: { rows: Track }) {
   const simulated = rows.real.some((row) => row !== null);
@@ -152,14 +145,16 @@ function RunEvents({ rows }: { rows: Track }) {
 
 function Missed({ record }: { record: RunDetail }) {
   if (record.mode !== "scan" || record.outcome === null) return null;
-  if (missedArea.value < 0.05) return <p>Nothing worth a drive was missed.</p>;
+  if (missedArea.value !== null && missedArea.value < 0.05)
+    return <p>Nothing worth a drive was missed.</p>;
   return (
     <Button
       kind="primary"
       disabled={mission.value !== null}
       onClick={() => void planPending(record.id, record.site_id)}
     >
-      Cover what was missed ({area(missedArea.value)})
+      Cover what was missed
+      {missedArea.value !== null && <span class="nowrap"> ({area(missedArea.value)})</span>}
     </Button>
   );
 }
@@ -175,8 +170,9 @@ function Run({ record }: { record: RunDetail }) {
         </h3>
       </div>
       <p>
-        <strong>{outcomeOf(record)}</strong>
-        {record.reason && `: ${record.reason}`}
+        {/* "Ended early: ended by hand" would say it twice. */}
+        <strong>{(record.outcome === "paused" && record.reason) || outcomeOf(record)}</strong>
+        {record.outcome !== "paused" && record.reason && `: ${record.reason}`}
       </p>
       {record.mode === "scan" && (
         <Figure value={percent(record.coverage)} name="of the area covered" />

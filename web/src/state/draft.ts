@@ -22,7 +22,7 @@ import { formatSelection, NEW_ID, parseSelection } from "../core/address";
 import { go, location } from "./location";
 import { doing, say, sentenceOf } from "./notice";
 import { readRobotSite } from "./robot";
-import { refreshSites } from "./sites";
+import { refreshSites, sites } from "./sites";
 import { stored, storedKeys, storeText } from "./storage";
 
 interface Saved {
@@ -123,8 +123,19 @@ export async function openSite(id: number): Promise<void> {
   if (record) lay(fromRecord(record));
 }
 
+/** "Site 2": a name that no other site has, kept or not. */
+function freeName(): string {
+  const taken = new Set([
+    ...(sites.peek() ?? []).map((summary) => summary.name),
+    ...unsavedSites().map(({ name }) => name),
+  ]);
+  let n = 1;
+  while (taken.has(`Site ${n}`)) n += 1;
+  return `Site ${n}`;
+}
+
 /** Begins a site; one that was begun before and never saved stays in the list. */
-export function newSite(from: Site = emptySite("New site")): void {
+export function newSite(from: Site = emptySite(freeName())): void {
   let n = 1;
   while (stored(`${NEW}${n}`)) n += 1;
   lay({ id: null, key: `${NEW}${n}`, version: null, site: emptySite(from.name) });

@@ -18,6 +18,9 @@ export const routeName = signal<string | null>(null);
 export const plan = signal<PlanRecord | null>(null);
 export const planning = signal<string | null>(null);
 export const refusal = signal<string | null>(null);
+/** The refusal is that the robot stands elsewhere, or looks elsewhere, than the plan begins. */
+export const elsewhere = signal(false);
+let asking: AbortController | null = null;
 
 /** The route that Track route would take. */
 export const chosenRoute = computed(() => {
@@ -37,18 +40,25 @@ async function ask(what: string, request: PlanRequest): Promise<void> {
   planning.value = what;
   plan.value = null;
   refusal.value = null;
+  asking = new AbortController();
   try {
-    plan.value = await api.makePlan(request);
+    plan.value = await api.makePlan(request, asking.signal);
     go(
       { place: "check", id: plan.value.site_id, detail: String(plan.value.id) },
       location.value.place === "check",
     );
   } catch (error) {
     plan.value = null;
-    refusal.value = sentenceOf(error);
+    refusal.value = asking?.signal.aborted ? null : sentenceOf(error);
   } finally {
     planning.value = null;
+    asking = null;
   }
+}
+
+/** Nobody wants this plan any more; the server gives it up too. */
+export function stopPlanning(): void {
+  asking?.abort();
 }
 
 /** Plans for the site on the table; saves it first, since only saved sites are driven. */
@@ -76,6 +86,22 @@ export async function planPending(runId: number, siteId: number): Promise<void> 
   await ask("Planning what was missed", { site_id: siteId, mode: "scan", pending_of: runId });
 }
 
+/** The same job once more, from where the robot is now. */
+export async function planAgain(): Promise<void> {
+  const old = plan.value;
+  if (!old) return;
+  const { site_id, mode, route, tool_width, clearance, min_turn_radius, pending_of } = old;
+  await ask("Planning again", {
+    site_id,
+    mode,
+    tool_width,
+    clearance,
+    min_turn_radius,
+    ...(route === null ? {} : { route }),
+    ...(pending_of === null ? {} : { pending_of }),
+  });
+}
+
 /** The plan that starts as soon as the robot knows its place; null: none waits. */
 export const waiting = signal<number | null>(null);
 
@@ -93,6 +119,7 @@ export async function start(): Promise<void> {
   const record = plan.value;
   if (!record) return;
   refusal.value = null;
+  elsewhere.value = false;
   if (snapshot.value && snapshot.value.site_id !== record.site_id) {
     if (!(await useSite(record.site_id))) return;
   } else if (snapshot.value?.state !== "fixing") {
@@ -117,6 +144,7 @@ async function startNow(id: number): Promise<void> {
     await api.startMission(id);
     go({ place: "drive" });
   } catch (error) {
+    elsewhere.value = error instanceof api.ApiError && error.code === "elsewhere";
     refusal.value = sentenceOf(error);
   }
 }

@@ -16,6 +16,12 @@ export const runSite = signal<Site | null>(null);
 export const moment = signal<number | null>(null);
 export const playing = signal(false);
 export const POINT_KINDS = ["real", "measured", "estimated", "target"] as const;
+export const KIND_WORDS: Record<PointKind, string> = {
+  real: "Real",
+  measured: "Measured",
+  estimated: "Estimated",
+  target: "Target",
+};
 export type PointKind = (typeof POINT_KINDS)[number];
 export const shown = signal<Record<PointKind, boolean>>({
   real: true,
@@ -24,7 +30,11 @@ export const shown = signal<Record<PointKind, boolean>>({
   target: true,
 });
 
-export const missedArea = computed(() => multiPolygonArea(run.value?.missed ?? []));
+/** Null where it is not known: a run that was interrupted, or still goes on. */
+export const missedArea = computed(() => {
+  const missed = run.value?.missed;
+  return missed ? multiPolygonArea(missed) : null;
+});
 export const span = computed<[number, number] | null>(() => {
   const t = track.value?.t ?? [];
   return t.length > 1 ? [t[0], t[t.length - 1]] : null;

@@ -100,6 +100,29 @@ export function Figure({ value, name }: { value: string; name: string }) {
   );
 }
 
+/** Something that takes its time: what, for how long already, and how to be rid of it. */
+export function Busy({ text, children }: { text: string; children?: ComponentChildren }) {
+  const [seconds, setSeconds] = useState(0);
+  useEffect(() => {
+    const began = performance.now();
+    const timer = setInterval(
+      () => setSeconds(Math.floor((performance.now() - began) / 1000)),
+      500,
+    );
+    return () => clearInterval(timer);
+  }, []);
+  return (
+    <div class="busy">
+      <progress aria-label={text} />
+      <div class="row">
+        <span role="status">{text}</span>
+        {seconds > 0 && <span class="quiet number">{seconds} s</span>}
+        {children}
+      </div>
+    </div>
+  );
+}
+
 export function Section({
   title,
   children,

@@ -15,7 +15,7 @@ from shapely import MultiPolygon, Polygon
 from polepilot.core.errors import PlanError
 from polepilot.core.geometry import Pose2D, wrap_angle
 from polepilot.core.plan import PartKind, Plan, PlanPart
-from polepilot.core.planning.drivable import Driver
+from polepilot.core.planning.driver import Driver
 from polepilot.core.planning.offset import (
     Points,
     Stroke,

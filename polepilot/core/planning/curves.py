@@ -21,7 +21,9 @@ Piece = tuple[str, float]
 """("S" straight, "L" left or "R" right, signed length in metres: backward negative)."""
 Curve = tuple[Piece, ...]
 
-_STEP = math.radians(5.0)
+CHANGE = 0.5
+"""What a change of gear costs, as metres of path."""
+STEP = math.radians(5.0)
 """Arcs are drawn with a vertex at least every so many radians."""
 
 
@@ -33,6 +35,27 @@ def gear_changes(curve: Curve) -> int:
     """How often a curve changes between forward and backward."""
     signs = [length > 0 for _, length in curve if abs(length) > 1e-6]
     return sum(a != b for a, b in pairwise(signs))
+
+
+def curve_cost(curve: Curve) -> float:
+    """Of a curve that is entered and left in forward gear."""
+    return curve_length(curve) + CHANGE * gear_changes((("S", 1e-3), *curve, ("S", 1e-3)))
+
+
+def joined(curve: Curve) -> Curve:
+    """Neighbouring straight pieces in one gear as one; those that cancel are dropped.
+
+    Straight forward and back again is kept: it sweeps what lies there.
+    """
+    pieces: list[tuple[str, float]] = []
+    for kind, length in curve:
+        if abs(length) < 1e-9:
+            continue
+        if pieces and pieces[-1][0] == kind and (pieces[-1][1] > 0) == (length > 0):
+            pieces[-1] = (kind, pieces[-1][1] + length)
+        else:
+            pieces.append((kind, length))
+    return tuple(pieces)
 
 
 def drive(pose: Pose2D, piece: Piece, radius: float) -> Pose2D:
@@ -62,7 +85,7 @@ def sample(
             new = np.array([pose.ahead(length)])
         else:
             side = 1.0 if kind == "L" else -1.0
-            count = max(1, math.ceil(abs(length) / radius / _STEP - 1e-6))
+            count = max(1, math.ceil(abs(length) / radius / STEP - 1e-6))
             angle = pose.heading + side * np.arange(1, count + 1) / count * length / radius
             new = np.stack(
                 [

@@ -13,7 +13,7 @@ from shapely import MultiPolygon
 from polepilot.core.errors import PlanError
 from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.plan import Plan, PlanPart
-from polepilot.core.planning.drivable import Driver
+from polepilot.core.planning.driver import Driver
 from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.score import predict
 from polepilot.core.planning.space import FreeSpace, free_space

@@ -10,39 +10,31 @@ which is always possible. What cannot be connected at all is left out, and said.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
-from shapely import LineString
 
 from polepilot.core import geometry
 from polepilot.core.geometry import Pose2D, angle_between, wrap_angle
 from polepilot.core.planning.curves import (
+    CHANGE,
     Curve,
+    curve_cost,
     curve_length,
-    gear_changes,
+    joined,
     sample,
     shortest_curves,
 )
 from polepilot.core.planning.space import FreeSpace
+from polepilot.core.planning.track import PLAIN, Track
+from polepilot.core.planning.turns import turns_round
 
 Points = NDArray[np.float64]
 
 CUT = 0.05
 """A corner may be cut by this much, metres."""
-CHANGE = 0.5
-"""What a change of gear costs, as metres of path."""
 _RADIUS_MARGIN = 1.02
 """Arcs are this much wider than asked for, so that their chords keep the radius."""
-_PLAIN = math.radians(3.0)
-"""A turn below this is left as it is where its legs are long enough."""
-_CHORD = 0.12
-"""What is longer than this is no chord of an arc, metres."""
-_ARC = math.radians(5.0)
 _PATIENCE = 12
 """How often backing out may fail before it is no longer tried."""
 _MOST_TURNS = 80
@@ -54,72 +46,14 @@ _BACK_OUT = (0.25, 0.5, 0.8, 1.2, 1.8, 2.6, 3.8, 5.5, 8.0, 12.0, 20.0, 40.0)
 """How far to back out along the track where nothing fits, metres."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Turn:
-    """A way round a corner, in a frame with the corner at the origin and the way in along x."""
-
-    cost: float
-    cut: float
-    lead: float
-    """Where on the line of the way in it begins to turn, metres; negative: before the corner."""
-    visit: bool
-    """Whether the corner is driven to first; else the turn begins before it is reached."""
-    stop: float
-    """Where on the way out it ends; negative: before the corner."""
-    curve: Curve
-    """From ``lead`` to ``stop``."""
-    points: Points
-    """The curve's points, M x 2, from the corner on where that is visited."""
-
-    def after(self, before: float) -> Curve:
-        """The whole curve for a corner that lies ``before`` metres ahead."""
-        if self.visit:
-            return _joined((("S", before), ("S", self.lead), *self.curve))
-        return _joined((("S", before + self.lead), *self.curve))
-
-
-@dataclass(slots=True)
-class Track:
-    """The path so far: points, gears, and the pose at its end."""
-
-    pose: Pose2D
-    points: list[Points] = field(default_factory=list)
-    gears: list[NDArray[np.int8]] = field(default_factory=list)
-    count: int = 1
-    straight: float = 0.0
-    """How far the robot can go straight back from here on its own track."""
-
-    def __post_init__(self) -> None:
-        self.points.append(np.array([self.pose.position]))
-
-    @property
-    def last(self) -> int:
-        """Index of the last point."""
-        return self.count - 1
-
-    def add(self, points: Points, gears: NDArray[np.int8], pose: Pose2D) -> None:
-        """Appends points after the first, which is where the track ends."""
-        if len(gears):
-            self.points.append(points[1:])
-            self.gears.append(gears)
-            self.count += len(gears)
-        self.pose = pose
-
-    def arrays(self) -> tuple[Points, NDArray[np.int8]]:
-        gears = np.concatenate(self.gears) if self.gears else np.zeros(0, np.int8)
-        return np.vstack(self.points), gears
-
-
 class Driver:
     """Drives runs one after the other, inside the free space, no tighter than ``radius``."""
 
     def __init__(self, space: FreeSpace, radius: float, pose: Pose2D) -> None:
         self._space = space
         self._radius = radius * _RADIUS_MARGIN
-        self.track = Track(pose)
+        self.track = Track(pose, self._radius)
         self._patience = _PATIENCE
-        self._reserve = 0.0
-        """How much of the leg after a corner left as it is must stay straight, metres."""
 
     def follow(self, points: Points, cut: float = CUT) -> None:
         """Drives along ``points``, on whose first leg the track already stands.
@@ -131,7 +65,7 @@ class Driver:
         while index < len(points):
             corner = points[index]
             if index == len(points) - 1:
-                self._straight_to(corner)
+                self.track.straight_to(corner)
                 return
             after = points[index + 1] - corner
             heading = math.atan2(after[1], after[0])
@@ -139,7 +73,7 @@ class Driver:
                 index += 1
                 continue
             # Nothing fits at this corner: go there, then find a way to what follows.
-            self._straight_to(corner)
+            self.track.straight_to(corner)
             resumed = self._resume(points, index)
             if resumed is None:
                 return
@@ -152,21 +86,21 @@ class Driver:
         """
         if math.dist(self.track.pose.position, place) < 1e-6:
             return True
-        saved = self._save()
+        saved = self.track.save()
         aimed = self._aim(place)
         if aimed is not None and curve_length(aimed) < 1.5 * self._radius + math.dist(
             self.track.pose.position, place
         ):
-            self._append(aimed)
+            self.track.append(aimed)
             return True
         if self.connect(place, None):
-            if aimed is None or self._cost_since(saved) <= _cost(aimed):
+            if aimed is None or self.track.cost_since(saved) <= curve_cost(aimed):
                 return True
-            self._restore(saved)
+            self.track.restore(saved)
         if aimed is not None:
-            self._append(aimed)
+            self.track.append(aimed)
             return True
-        self._restore(saved)
+        self.track.restore(saved)
         return False
 
     def _aim(self, place: geometry.Point) -> Curve | None:
@@ -185,7 +119,7 @@ class Driver:
             turn = 0.0 if turn > math.tau - 1e-9 else turn
             found.append(((kind, turn * self._radius), ("S", rest)))
         found.sort(key=curve_length)
-        return next((curve for curve in found if self._fits(pose, _joined(curve))), None)
+        return next((curve for curve in found if self._fits(pose, joined(curve))), None)
 
     def connect(self, place: geometry.Point, heading: float | None, back_out: bool = True) -> bool:
         """Goes to ``place`` and stands there with ``heading`` (None: any); False: no way found.
@@ -201,14 +135,14 @@ class Driver:
         if not back_out or self._patience <= 0:
             return False
         self._patience -= 1
-        saved = self._save()
+        saved = self.track.save()
         for distance in _BACK_OUT:
             # From the same place each time: backing out twice would lead in again.
-            enough = self._back_out(distance)
+            enough = self.track.back_out(distance)
             if self._connect_here(place, heading):
                 self._patience = min(self._patience + 1, _PATIENCE)
                 return True
-            self._restore(saved)
+            self.track.restore(saved)
             if not enough:
                 break
         return False
@@ -221,17 +155,17 @@ class Driver:
             direct = self._direct(place, heading)
         far = math.dist(pose.position, place) > 4 * self._radius or heading is None
         if direct is not None and not far:
-            self._append(direct[1])
+            self.track.append(direct[1])
             return True
-        saved = self._save()
+        saved = self.track.save()
         if self._along_path(place, heading) and (
-            direct is None or self._cost_since(saved) <= direct[0]
+            direct is None or self.track.cost_since(saved) <= direct[0]
         ):
             return True
-        self._restore(saved)  # it may have got half-way
+        self.track.restore(saved)  # it may have got half-way
         if direct is None:
             return False
-        self._append(direct[1])
+        self.track.append(direct[1])
         return True
 
     def _direct(self, place: geometry.Point, heading: float) -> tuple[float, Curve] | None:
@@ -245,8 +179,8 @@ class Driver:
             for ahead in (0.0, -0.6 * self._radius, self._radius):
                 there = Pose2D(*goal.ahead(ahead), heading)
                 for curve in shortest_curves(here, there, self._radius, CHANGE)[:6]:
-                    whole = _joined((("S", -back), *curve, ("S", -ahead)))
-                    found.append((_cost(whole), whole))
+                    whole = joined((("S", -back), *curve, ("S", -ahead)))
+                    found.append((curve_cost(whole), whole))
         found.sort(key=lambda entry: entry[0])
         for cost, curve in found:
             if self._fits(pose, curve):
@@ -275,7 +209,7 @@ class Driver:
             elif heading is not None:
                 turn, room = heading, 0.0
             else:
-                self._straight_to(corner)
+                self.track.straight_to(corner)
                 return True
             before = float(np.hypot(*(corner - np.array(self.track.pose.position))))
             if not self._turn_at(corner, turn, before, room, math.inf):
@@ -283,7 +217,7 @@ class Driver:
             if length < 1e-9:
                 return False
         if heading is not None:
-            self._straight_to(points[-1])
+            self.track.straight_to(points[-1])
         return True
 
     @staticmethod
@@ -294,13 +228,13 @@ class Driver:
         """Passes the corner ``points[index]``: plain, rounded, or turned."""
         corner = points[index]
         here = np.array(self.track.pose.position)
-        before = float(np.dot(corner - here, self._ahead()))
+        before = float(np.dot(corner - here, self.track.ahead()))
         after = float(np.hypot(*(points[index + 1] - corner)))
         turn = angle_between(self.track.pose.heading, heading)
-        if abs(turn) < _PLAIN and abs(turn) * self._radius < 0.7 * min(max(before, 0.0), after):
-            self._straight_to(corner)
+        if abs(turn) < PLAIN and abs(turn) * self._radius < 0.7 * min(max(before, 0.0), after):
+            self.track.straight_to(corner)
             self.track.pose = Pose2D(*self.track.pose.position, heading)
-            self._reserve = abs(turn) * self._radius
+            self.track.reserve = abs(turn) * self._radius
             return True
         room = after
         if index + 2 < len(points):
@@ -313,11 +247,11 @@ class Driver:
                 room = after * mine / max(mine + theirs, 1e-9)
         tangent = self._radius * math.tan(min(abs(turn), 3.1) / 2)
         width = self._radius * (1 / math.cos(min(abs(turn), 3.1) / 2) - 1)
-        if width <= cut and tangent <= min(before - self._reserve, room) + 1e-9:
+        if width <= cut and tangent <= min(before - self.track.reserve, room) + 1e-9:
             arc: Curve = (("L" if turn > 0 else "R", abs(turn) * self._radius),)
-            whole = _joined((("S", before - tangent), *arc))
+            whole = joined((("S", before - tangent), *arc))
             if self._fits(self.track.pose, whole):
-                self._append(whole)
+                self.track.append(whole)
                 self.track.straight = 0.0
                 return True
         return self._turn_at(corner, heading, before, after, cut)
@@ -333,15 +267,15 @@ class Driver:
         pose = self.track.pose
         turn = angle_between(pose.heading, heading)
         if abs(turn) < 1e-6:
-            self._straight_to(corner)
+            self.track.straight_to(corner)
             return True
         room_before = before + self.track.straight
         options = [
             way
-            for way in _turns(round(turn, 9), round(self._radius, 9))
+            for way in turns_round(round(turn, 9), round(self._radius, 9))
             if -way.lead <= room_before + 1e-9
             and way.stop <= after + 1e-9
-            and (way.visit or not 0 <= before + way.lead < self._reserve)
+            and (way.visit or not 0 <= before + way.lead < self.track.reserve)
         ]
         if math.isinf(cut):
             options.sort(key=lambda way: way.cost - 20 * min(way.cut, 0.5) ** 2)
@@ -354,7 +288,7 @@ class Driver:
         for way in options[:_MOST_TURNS]:
             points = np.vstack([start, way.points @ turned + corner_here])
             if self._space.holds_points(points):
-                self._append(way.after(before))
+                self.track.append(way.after(before))
                 self.track.pose = Pose2D(*self.track.pose.position, heading)
                 return True
         return False
@@ -376,7 +310,7 @@ class Driver:
             if self._connect_here(there, heading):
                 return leg + 1
             if self._connect_here(there, wrap_angle(heading + math.pi)):
-                self._append((("S", -length),))
+                self.track.append((("S", -length),))
                 if leg + 1 == len(points) - 1:
                     return len(points)
                 continue
@@ -386,156 +320,11 @@ class Driver:
                 break
         return None
 
-    def _back_out(self, distance: float) -> bool:
-        """Drives back on its own track, in arcs to the next of its points; False: to its start."""
-        points, gears = self.track.arrays()
-        taken: list[Points] = [points[-1]]
-        back: list[int] = []
-        rest = distance
-        index = len(gears) - 1
-        heading = self.track.pose.heading
-        while rest > 1e-6 and index >= 0:
-            a, b = points[index + 1], points[index]
-            step = float(np.hypot(*(b - a)))
-            if step > 1e-9:
-                gear = -int(gears[index])
-                heading = _direction((b - a) * gear)
-                part = rest / step if step > _CHORD and rest < step else 1.0
-                if part == 1.0 and index > 0 and gears[index - 1] == gears[index]:
-                    # At a vertex of an arc the heading is between those of its two chords.
-                    beyond = _direction((points[index - 1] - b) * gear)
-                    if abs(turn := angle_between(heading, beyond)) < _PLAIN + _ARC:
-                        heading = wrap_angle(heading + turn / 2)
-                taken.append(a + (b - a) * part)
-                back.append(gear)
-            rest -= step
-            index -= 1
-        self.track.add(
-            np.array(taken),
-            np.array(back, np.int8),
-            Pose2D(float(taken[-1][0]), float(taken[-1][1]), heading),
-        )
-        self.track.straight = 0.0
-        return rest <= 1e-6
-
-    def _straight_to(self, corner: Points) -> None:
-        """Straight to a place on the line of the present heading, forward or back."""
-        way = float(np.dot(corner - np.array(self.track.pose.position), self._ahead()))
-        self._append((("S", way),))
-
-    def _append(self, curve: Curve) -> None:
-        curve = _joined(curve)
-        if not curve:
-            return
-        points, gears, pose = sample(self.track.pose, curve, self._radius)
-        straight = self.track.straight if curve[0][0] == "S" else 0.0
-        if len(curve) == 1 and curve[0][0] == "S":
-            straight = max(0.0, straight + curve[0][1])
-        else:
-            straight = max(0.0, curve[-1][1]) if curve[-1][0] == "S" else 0.0
-        self.track.add(points, gears, pose)
-        self.track.straight = straight
-        self._reserve = 0.0
-
     def _fits(self, pose: Pose2D, curve: Curve) -> bool:
         return self._space.holds_points(sample(pose, curve, self._radius)[0])
-
-    def _ahead(self) -> Points:
-        heading = self.track.pose.heading
-        return np.array([math.cos(heading), math.sin(heading)])
-
-    def _save(self) -> tuple[int, int, Pose2D, float]:
-        return len(self.track.points), self.track.count, self.track.pose, self.track.straight
-
-    def _restore(self, saved: tuple[int, int, Pose2D, float]) -> None:
-        pieces, self.track.count, self.track.pose, self.track.straight = saved
-        del self.track.points[pieces:]
-        del self.track.gears[max(pieces - 1, 0) :]
-
-    def _cost_since(self, saved: tuple[int, int, Pose2D, float]) -> float:
-        points = np.vstack([self.track.points[saved[0] - 1][-1:], *self.track.points[saved[0] :]])
-        gears = [gear for block in self.track.gears[saved[0] - 1 :] for gear in block.tolist()]
-        changes = sum(a != b for a, b in pairwise(gears))
-        return float(_length(points) + CHANGE * changes)
-
-
-@lru_cache(maxsize=4000)
-def _turns(turn: float, radius: float) -> tuple[_Turn, ...]:
-    """Ways round a corner of ``turn`` radians, the cheapest first."""
-    legs = radius * math.tan(min(abs(turn), math.radians(120)) / 2)
-    out = np.array([math.cos(turn), math.sin(turn)])
-    ways: list[_Turn] = []
-
-    def add(first: float, last: float, visit: bool, finish: bool) -> None:
-        """From ``first`` on the way in to ``last`` on the way out, in shares of ``legs``.
-
-        ``visit``: to the corner before that; ``finish``: back to the corner after that.
-        """
-        first, last = first * legs, last * legs
-        finish = finish or last < 0  # what lies before the corner must be free as well
-        start = Pose2D(first, 0.0, 0.0)
-        end = Pose2D(last * math.cos(turn), last * math.sin(turn), wrap_angle(turn))
-        for curve in shortest_curves(start, end, radius, CHANGE)[:4]:
-            checks: list[Points] = []
-            if not visit and first < 0:
-                checks += [np.array([first * share, 0.0]) for share in (0.0, 0.25, 0.5, 0.75)]
-            if not finish and last > 0:
-                checks += [last * share * out for share in (0.25, 0.5, 0.75)]
-            cut = 0.0
-            if checks:
-                line = LineString(sample(start, curve, radius)[0])
-                cut = float(np.max(shapely.distance(line, shapely.points(np.array(checks)))))
-            whole: Curve = (*curve, ("S", -last)) if finish else curve
-            stop = 0.0 if finish else last
-            begin = Pose2D(0.0, 0.0, 0.0) if visit else start
-            driven = (("S", first), *whole) if visit else whole
-            points = sample(begin, _joined(driven), radius)[0]
-            way = _Turn(0.0, cut, first, visit, stop, _joined(whole), points)
-            cost = _cost(way.after(10.0)) - 10.0 - stop + 20 * min(cut, 0.5) ** 2
-            ways.append(replace(way, cost=cost))
-
-    for share in (0.25, 0.5, 0.75, 1.0):
-        add(-share, share, visit=False, finish=False)
-    for first, last in ((0, 0), (1, -1), (0.5, -0.5), (0.5, 0), (0, -0.5), (0, -1), (1, 0)):
-        add(first, last, visit=True, finish=False)
-    for first, last in ((-1, 1), (-0.5, 1), (-1, 0.5), (-0.5, 0.5), (-0.25, 0.25), (0, 0.5)):
-        add(first, last, visit=True, finish=True)
-        add(first, last, visit=True, finish=False)
-    for first, last in ((-0.5, 0), (-1, 0), (-0.5, -0.5), (-1.5, 1.5), (-2, 1), (-2, 2)):
-        add(first, last, visit=True, finish=True)
-    return tuple(sorted(ways, key=lambda way: way.cost))
-
-
-def _direction(step: Points) -> float:
-    return math.atan2(step[1], step[0])
-
-
-def _joined(curve: Curve) -> Curve:
-    """Neighbouring straight pieces in one gear as one; those that cancel are dropped.
-
-    Straight forward and back again is kept: it sweeps what lies there.
-    """
-    pieces: list[tuple[str, float]] = []
-    for kind, length in curve:
-        if abs(length) < 1e-9:
-            continue
-        if pieces and pieces[-1][0] == kind and (pieces[-1][1] > 0) == (length > 0):
-            pieces[-1] = (kind, pieces[-1][1] + length)
-        else:
-            pieces.append((kind, length))
-    return tuple(pieces)
-
-
-def _cost(curve: Curve) -> float:
-    """Of a curve that is entered and left in forward gear."""
-    return curve_length(curve) + CHANGE * gear_changes((("S", 1e-3), *curve, ("S", 1e-3)))
 
 
 def _tidy(points: Points) -> Points:
     """Without repeated points."""
     steps = np.hypot(*np.diff(points, axis=0).T)
     return points[np.r_[True, steps > 1e-6]]
-
-
-def _length(points: Points) -> float:
-    return float(np.hypot(*np.diff(points, axis=0).T).sum()) if len(points) > 1 else 0.0

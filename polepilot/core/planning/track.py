@@ -1,0 +1,138 @@
+"""The path so far of a robot that is driven through a plan, and the pose at its end."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polepilot.core.geometry import Pose2D, angle_between, wrap_angle
+from polepilot.core.planning.curves import CHANGE, STEP, Curve, joined, sample
+
+Points = NDArray[np.float64]
+Saved = tuple[int, int, Pose2D, float]
+
+PLAIN = math.radians(3.0)
+"""A turn below this is left as it is where its legs are long enough."""
+_CHORD = 0.12
+"""What is longer than this is no chord of an arc, metres."""
+
+
+@dataclass(slots=True)
+class Track:
+    """The path so far: points, gears, and the pose at its end."""
+
+    pose: Pose2D
+    radius: float
+    """Of the arcs that are appended."""
+    points: list[Points] = field(default_factory=list)
+    gears: list[NDArray[np.int8]] = field(default_factory=list)
+    count: int = 1
+    straight: float = 0.0
+    """How far the robot can go straight back from here on its own track."""
+    reserve: float = 0.0
+    """How much of the leg after a corner left as it is must stay straight, metres."""
+
+    def __post_init__(self) -> None:
+        self.points.append(np.array([self.pose.position]))
+
+    @property
+    def last(self) -> int:
+        """Index of the last point."""
+        return self.count - 1
+
+    def add(self, points: Points, gears: NDArray[np.int8], pose: Pose2D) -> None:
+        """Appends points after the first, which is where the track ends."""
+        if len(gears):
+            self.points.append(points[1:])
+            self.gears.append(gears)
+            self.count += len(gears)
+        self.pose = pose
+
+    def arrays(self) -> tuple[Points, NDArray[np.int8]]:
+        gears = np.concatenate(self.gears) if self.gears else np.zeros(0, np.int8)
+        return np.vstack(self.points), gears
+
+    def append(self, curve: Curve) -> None:
+        """Drives ``curve`` from the end on."""
+        curve = joined(curve)
+        if not curve:
+            return
+        points, gears, pose = sample(self.pose, curve, self.radius)
+        straight = self.straight if curve[0][0] == "S" else 0.0
+        if len(curve) == 1 and curve[0][0] == "S":
+            straight = max(0.0, straight + curve[0][1])
+        else:
+            straight = max(0.0, curve[-1][1]) if curve[-1][0] == "S" else 0.0
+        self.add(points, gears, pose)
+        self.straight = straight
+        self.reserve = 0.0
+
+    def straight_to(self, corner: Points) -> None:
+        """Straight to a place on the line of the present heading, forward or back."""
+        way = float(np.dot(corner - np.array(self.pose.position), self.ahead()))
+        self.append((("S", way),))
+
+    def back_out(self, distance: float) -> bool:
+        """Drives back on its own track, in arcs to the next of its points; False: to its start."""
+        points, gears = self.arrays()
+        taken: list[Points] = [points[-1]]
+        back: list[int] = []
+        rest = distance
+        index = len(gears) - 1
+        heading = self.pose.heading
+        while rest > 1e-6 and index >= 0:
+            a, b = points[index + 1], points[index]
+            step = float(np.hypot(*(b - a)))
+            if step > 1e-9:
+                gear = -int(gears[index])
+                heading = _direction((b - a) * gear)
+                part = rest / step if step > _CHORD and rest < step else 1.0
+                if part == 1.0 and index > 0 and gears[index - 1] == gears[index]:
+                    # At a vertex of an arc the heading is between those of its two chords.
+                    beyond = _direction((points[index - 1] - b) * gear)
+                    if abs(turn := angle_between(heading, beyond)) < PLAIN + STEP:
+                        heading = wrap_angle(heading + turn / 2)
+                taken.append(a + (b - a) * part)
+                back.append(gear)
+            rest -= step
+            index -= 1
+        self.add(
+            np.array(taken),
+            np.array(back, np.int8),
+            Pose2D(float(taken[-1][0]), float(taken[-1][1]), heading),
+        )
+        self.straight = 0.0
+        return rest <= 1e-6
+
+    def ahead(self) -> Points:
+        """The direction in which the robot looks, of length 1."""
+        heading = self.pose.heading
+        return np.array([math.cos(heading), math.sin(heading)])
+
+    def save(self) -> Saved:
+        """What ``restore`` needs to forget all that is driven from here on."""
+        return len(self.points), self.count, self.pose, self.straight
+
+    def restore(self, saved: Saved) -> None:
+        pieces, self.count, self.pose, self.straight = saved
+        del self.points[pieces:]
+        del self.gears[max(pieces - 1, 0) :]
+
+    def cost_since(self, saved: Saved) -> float:
+        """Length since then with what changes of gear cost, metres."""
+        points = np.vstack([self.points[saved[0] - 1][-1:], *self.points[saved[0] :]])
+        gears = [gear for block in self.gears[saved[0] - 1 :] for gear in block.tolist()]
+        changes = sum(a != b for a, b in pairwise(gears))
+        return float(_length(points) + CHANGE * changes)
+
+
+def _direction(step: Points) -> float:
+    return math.atan2(step[1], step[0])
+
+
+def _length(points: Points) -> float:
+    return float(np.hypot(*np.diff(points, axis=0).T).sum()) if len(points) > 1 else 0.0

@@ -1,0 +1,98 @@
+"""Ways round a corner for a wheel that turns no tighter than a radius, the cheapest first.
+
+A curve of Reeds and Shepp between the two legs, begun before, at, or beyond the corner.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import LineString
+
+from polepilot.core.geometry import Pose2D, wrap_angle
+from polepilot.core.planning.curves import (
+    CHANGE,
+    Curve,
+    curve_cost,
+    joined,
+    sample,
+    shortest_curves,
+)
+
+Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """A way round a corner, in a frame with the corner at the origin and the way in along x."""
+
+    cost: float
+    cut: float
+    lead: float
+    """Where on the line of the way in it begins to turn, metres; negative: before the corner."""
+    visit: bool
+    """Whether the corner is driven to first; else the turn begins before it is reached."""
+    stop: float
+    """Where on the way out it ends; negative: before the corner."""
+    curve: Curve
+    """From ``lead`` to ``stop``."""
+    points: Points
+    """The curve's points, M x 2, from the corner on where that is visited."""
+
+    def after(self, before: float) -> Curve:
+        """The whole curve for a corner that lies ``before`` metres ahead."""
+        if self.visit:
+            return joined((("S", before), ("S", self.lead), *self.curve))
+        return joined((("S", before + self.lead), *self.curve))
+
+
+@lru_cache(maxsize=4000)
+def turns_round(turn: float, radius: float) -> tuple[Turn, ...]:
+    """Ways round a corner of ``turn`` radians, the cheapest first."""
+    legs = radius * math.tan(min(abs(turn), math.radians(120)) / 2)
+    out = np.array([math.cos(turn), math.sin(turn)])
+    ways: list[Turn] = []
+
+    def add(first: float, last: float, visit: bool, finish: bool) -> None:
+        """From ``first`` on the way in to ``last`` on the way out, in shares of ``legs``.
+
+        ``visit``: to the corner before that; ``finish``: back to the corner after that.
+        """
+        first, last = first * legs, last * legs
+        finish = finish or last < 0  # what lies before the corner must be free as well
+        start = Pose2D(first, 0.0, 0.0)
+        end = Pose2D(last * math.cos(turn), last * math.sin(turn), wrap_angle(turn))
+        for curve in shortest_curves(start, end, radius, CHANGE)[:4]:
+            checks: list[Points] = []
+            if not visit and first < 0:
+                checks += [np.array([first * share, 0.0]) for share in (0.0, 0.25, 0.5, 0.75)]
+            if not finish and last > 0:
+                checks += [last * share * out for share in (0.25, 0.5, 0.75)]
+            cut = 0.0
+            if checks:
+                line = LineString(sample(start, curve, radius)[0])
+                cut = float(np.max(shapely.distance(line, shapely.points(np.array(checks)))))
+            whole: Curve = (*curve, ("S", -last)) if finish else curve
+            stop = 0.0 if finish else last
+            begin = Pose2D(0.0, 0.0, 0.0) if visit else start
+            driven = (("S", first), *whole) if visit else whole
+            points = sample(begin, joined(driven), radius)[0]
+            way = Turn(0.0, cut, first, visit, stop, joined(whole), points)
+            cost = curve_cost(way.after(10.0)) - 10.0 - stop + 20 * min(cut, 0.5) ** 2
+            ways.append(replace(way, cost=cost))
+
+    for share in (0.25, 0.5, 0.75, 1.0):
+        add(-share, share, visit=False, finish=False)
+    for first, last in ((0, 0), (1, -1), (0.5, -0.5), (0.5, 0), (0, -0.5), (0, -1), (1, 0)):
+        add(first, last, visit=True, finish=False)
+    for first, last in ((-1, 1), (-0.5, 1), (-1, 0.5), (-0.5, 0.5), (-0.25, 0.25), (0, 0.5)):
+        add(first, last, visit=True, finish=True)
+        add(first, last, visit=True, finish=False)
+    for first, last in ((-0.5, 0), (-1, 0), (-0.5, -0.5), (-1.5, 1.5), (-2, 1), (-2, 2)):
+        add(first, last, visit=True, finish=True)
+    return tuple(sorted(ways, key=lambda way: way.cost))

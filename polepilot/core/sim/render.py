@@ -380,12 +380,13 @@ class Renderer:
 
     def _expose(self, picture: Floats) -> Image:
         codes = cv2.multiply(picture, self._gain)
-        np.clip(codes, 0, _CODES - 1, out=codes)
-        grey = self._gamma[codes.astype(np.uint16)]
-        if self._look.noise > 0:
-            start = int(self._rng.integers(len(self._noise) - grey.size))
-            grey += self._noise[start : start + grey.size].reshape(grey.shape)
-        return np.asarray(cv2.convertScaleAbs(np.maximum(grey, 0, out=grey)), np.uint8)
+        grey = self._gamma.take(codes.astype(np.intp), mode="clip")
+        if self._look.noise <= 0:
+            return np.asarray(cv2.convertScaleAbs(grey), np.uint8)
+        start = int(self._rng.integers(len(self._noise) - grey.size))
+        noise = self._noise[start : start + grey.size].reshape(grey.shape)
+        # One pass that adds, keeps to 0..255 and makes bytes.
+        return np.asarray(cv2.add(grey, noise, dtype=cv2.CV_8U), np.uint8)
 
 
 def _samples(pixels: range, fine: int) -> Floats:

@@ -11,7 +11,7 @@ from polepilot.core.command import STAND, DriveCommand
 from polepilot.core.control.detour import Room, find
 from polepilot.core.control.memory import RADIUS, ObstacleMemory, Readings, Remembered
 from polepilot.core.control.stretches import Floats
-from polepilot.core.control.tracker import PathTracker
+from polepilot.core.control.tracker import SEARCH_AHEAD, PathTracker
 from polepilot.core.geometry import Point, Pose2D, wrap_angle
 from polepilot.core.observation import PoseEstimate
 from polepilot.core.plan import Plan, PlanPart, Prediction
@@ -35,6 +35,8 @@ LOOK = 2.0
 """So much of the path ahead is checked for conflicts, metres."""
 ASTRAY = 0.10
 """Farther from its path than this the plan says nothing about walls, metres."""
+AWAY = 0.20
+"""Farther than this from the next piece of the path it is not simply followed again, metres."""
 COME_AWAY = 0.6
 """Metres from where it first had to stand; nearer it still counts as blocked."""
 FIRST_REJOIN = 1.6
@@ -48,6 +50,8 @@ REPLAN_PERIOD = 0.5
 BACK_OFF_AFTER = 3.0
 """Seconds of standing before an obstacle without a way round, after which it makes room."""
 BACK_OFF = 0.35
+TWITCH = 0.08
+"""Who has not come farther than this has been standing, metres."""
 FAR_LEFT = 0.35
 """An obstacle whose centre is farther left of the path than this does not stand on it: it is
 passed on the right. (The paper always turns left, which would mean a way of more than a metre.)"""
@@ -78,10 +82,13 @@ class ObstacleAvoidance:
         self._rejoin_at = 0.0
         """Metres along the main path."""
         self._about: Point = (0.0, 0.0)
+        self._away = False
+        """A detour was begun that has not come back to the path yet."""
         self._side = 0
         """Of the present detour: 1 left, -1 right."""
         self._planned_at = -math.inf
         self._standing_since: float | None = None
+        self._stood_at: Point = (0.0, 0.0)
         self._blocked_since: float | None = None
         self._blocked_at: Point = (0.0, 0.0)
         self._backing = 0.0
@@ -160,10 +167,12 @@ class ObstacleAvoidance:
         if not self.active:
             self._standing_since = self._blocked_since = None
             return
-        if command.speed != 0:
-            self._standing_since = None
-        elif self._standing_since is None:
-            self._standing_since = now
+        if self._standing_since is not None:
+            # A short twitch after each new plan is no progress.
+            if pose.distance_to(self._stood_at) > TWITCH:
+                self._standing_since = None
+        elif command.speed == 0:
+            self._standing_since, self._stood_at = now, pose.position
         if self._blocked_since is None:
             if command.speed == 0:
                 self._blocked_since, self._blocked_at = now, pose.position
@@ -176,6 +185,10 @@ class ObstacleAvoidance:
         if self._detour is not None:
             return self._follow(now, dt, pose, tracker)
         conflict = self._conflict(tracker)
+        if conflict is None and self._away:
+            self._away = self._beside(pose, tracker)
+            if self._away:
+                conflict = self._remaining(pose, tracker)
         if conflict is None:
             self.reason = ""
             command = tracker.update(pose, dt)
@@ -186,6 +199,7 @@ class ObstacleAvoidance:
         if now - self._planned_at >= REPLAN_PERIOD:
             self._side = 0
             if self._plan(now, pose, tracker, conflict):
+                self._standing_since = None
                 return self._follow(now, dt, pose, tracker)
         if self._stood_for(now) > BACK_OFF_AFTER and self._close(pose):
             self._backing = BACK_OFF
@@ -220,6 +234,11 @@ class ObstacleAvoidance:
         place = points[first]
         obstacle = min(known, key=lambda one: math.dist(one.position, place))
         return last, obstacle
+
+    def _beside(self, pose: Pose2D, tracker: PathTracker) -> bool:
+        """Whether the next piece of the path is too far away to be followed from here."""
+        points, _, _ = tracker.path_ahead(SEARCH_AHEAD)
+        return len(points) > 0 and float(np.hypot(*(points - pose.position).T).min()) > AWAY
 
     def _close(self, pose: Pose2D) -> bool:
         """Whether more room in front would help."""
@@ -279,7 +298,8 @@ class ObstacleAvoidance:
         if self.blocked_for(now) > PATIENCE:
             sides, farthest = [1, -1], float(along[-1])
         free = _stays((self._gaps(points) >= CONCERN) & (gears > 0))
-        wanted = np.arange(last + 0.30, min(farthest, float(along[-1])) + 0.01, 0.30)
+        farthest = min(farthest, float(along[-1]))
+        wanted = np.append(np.arange(last + 0.30, farthest - 0.10, 0.30), max(farthest, last))
         places = np.searchsorted(along, wanted)
         places = places[places < len(points)]
         places = places[free[places]]
@@ -323,6 +343,7 @@ class ObstacleAvoidance:
         self._way = found[1]
         self._rejoin_at = float(along[index])
         self._about = barrier[0]
+        self._away = True
         # What follows in the same gear: the detour is to end along the path, but not to back.
         rest = points[index + 1 : index + 1 + LEAD_OUT]
         path = np.vstack([self._way, rest[: _before_gear_change(rest)]])
@@ -337,6 +358,7 @@ class ObstacleAvoidance:
         if detour.progress >= steps or detour.done:
             tracker.resume_at(self._rejoin_at + detour.progress - steps, rolling=self._last)
             self._detour = None
+            self._away = False
             self.reason = ""
             return tracker.update(pose, dt)
         rest, _, _ = detour.path_ahead(1.5)
@@ -379,6 +401,7 @@ class ObstacleAvoidance:
             self._standing_since = None
             return STAND
         self.reason = "Backing off to make room for passing an obstacle."
+        self._away = True
         return DriveCommand(-0.12, 0.0)
 
 

@@ -74,6 +74,7 @@ class Listener(uvicorn.Server):
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         await self._services.stop_robot()
+        await self._services.stop_planning()
         await super().shutdown(sockets)
 
     @contextlib.contextmanager

@@ -77,7 +77,7 @@ class Missions:
             first = self._store.add_site(demo)
             self._store.set_setting(_SITE_SETTING, str(first.id))
         for run in self._store.open_runs():
-            self._end(run.id, "interrupted", "the service ended while it was running")
+            self._end(run.id, "interrupted", "The service ended while it was running.")
             self._clerk.submit(self._mend, run)
 
     async def load_last_site(self) -> None:
@@ -372,7 +372,7 @@ class Missions:
             self._end(
                 run.id,
                 "interrupted",
-                "the service ended while it was running",
+                "The service ended while it was running.",
                 coverage=1 - missed.area / whole if whole > 0 else None,
                 travelled=length,
                 duration=seconds,

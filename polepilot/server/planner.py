@@ -69,6 +69,8 @@ class Planner:
                 ) from None
             if answer is None:
                 await self._kill()
+                if self._closed:
+                    raise _shutting_down()
                 raise BusyError("The planning process ended.", code="planning_failed")
         if "error" in answer:
             raise _error(answer["error"])
@@ -82,7 +84,7 @@ class Planner:
 
     async def _running(self) -> asyncio.subprocess.Process:
         if self._closed:
-            raise BusyError("The service is shutting down.")
+            raise _shutting_down()
         if self._process is None or self._process.returncode is not None:
             self._process = await asyncio.create_subprocess_exec(
                 sys.executable,
@@ -118,6 +120,12 @@ class Planner:
         await process.wait()
         if process.stdin is not None:
             process.stdin.close()
+
+
+def _shutting_down() -> BusyError:
+    return BusyError(
+        "The service is shutting down.", code="shutting_down", remedy="Start it again."
+    )
 
 
 def _error(document: dict[str, Any]) -> PolepilotError:

@@ -184,7 +184,7 @@ class Services:
         for task in list(self._tasks):
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
-        await self.planner.close()
+        await self.stop_planning()
         await self.panel_client.aclose()
         if self._feed is not None:
             await asyncio.to_thread(self._feed.stop)
@@ -196,6 +196,10 @@ class Services:
         """Wheels still, logs closed, the robot's thread ended."""
         if not await asyncio.to_thread(self.runner.stop):
             log.error("the robot's thread did not end")
+
+    async def stop_planning(self) -> None:
+        """Answer everybody who waits for a plan that there will be none."""
+        await self.planner.close()
 
     async def _warm_up(self) -> None:
         """What nobody should have to wait for, and what the start should not wait for."""

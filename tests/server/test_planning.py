@@ -238,3 +238,24 @@ def test_a_plan_that_nobody_waits_for_is_given_up(serve: Callable[..., Running])
         client.post(f"{running.url}{API}/plans", json=body, timeout=0.5)
     assert began.is_set()
     assert given_up.wait(3)
+
+
+def test_the_end_of_the_service_is_an_answer_to_who_waits_for_a_plan(
+    serve: Callable[..., Running],
+) -> None:
+    running = serve()
+    answers: list[httpx.Response] = []
+    # So fine a tool keeps the planner busy for much longer than the service takes to end.
+    body = {"site_id": 1, "mode": "scan", "tool_width": 0.05}
+
+    def ask() -> None:
+        answers.append(httpx.post(f"{running.url}{API}/plans", json=body, timeout=20))
+
+    asker = threading.Thread(target=ask)
+    asker.start()
+    time.sleep(1.0)
+    assert running.stop()
+    asker.join(5)
+    assert answers, "the connection was cut"
+    assert answers[0].status_code == 503
+    assert answers[0].json()["code"] == "shutting_down"

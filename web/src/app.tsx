@@ -62,7 +62,15 @@ export function App() {
     const timer = setInterval(() => {
       if (sites.value === null) void refreshSites();
     }, 2_000);
-    return () => clearInterval(timer);
+    // Others may have drawn meanwhile.
+    const back = () => document.hidden || void refreshSites();
+    document.addEventListener("visibilitychange", back);
+    window.addEventListener("focus", back);
+    return () => {
+      clearInterval(timer);
+      document.removeEventListener("visibilitychange", back);
+      window.removeEventListener("focus", back);
+    };
   }, []);
   return (
     <div class={`app ${phone.value ? "phone" : "desk"} in-${location.value.place}`}>

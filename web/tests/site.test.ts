@@ -164,3 +164,24 @@ describe("snapping", () => {
     expect(snap(free, [0.03, 1.03], { ...options, except }).to).toBe("grid 10 cm");
   });
 });
+
+it("a file that the page could not show is refused with what is wrong", () => {
+  const boundary = [
+    [0, 0],
+    [4, 0],
+    [4, 3],
+  ];
+  const wrong: [Record<string, unknown>, string][] = [
+    [{ boundary: "no" }, "boundary"],
+    [{ boundary: [[0, null]] }, "boundary"],
+    [{ boundary, islands: [[1, 2]] }, "islands"],
+    [{ boundary, walls: {} }, "walls"],
+    [{ boundary, landmarks: [{ id: 1 }] }, "landmarks"],
+    [{ boundary, landmarks: [null] }, "landmarks"],
+    [{ boundary, routes: [{ name: "A" }] }, "routes"],
+    [{ boundary, start: [1] }, "start"],
+    [{ boundary, name: 7 }, "name"],
+  ];
+  for (const [document, word] of wrong) expect(() => sites.asSite(document)).toThrow(word);
+  expect(sites.asSite({ boundary, start: null }).boundary).toEqual(boundary);
+});

@@ -53,7 +53,37 @@ export function asSite(document: unknown): Site {
   if (typeof document !== "object" || document === null || !("boundary" in document)) {
     throw new Error('This file is no site: a JSON object with a "boundary" was expected.');
   }
-  return clean({ ...emptySite("Imported site"), ...(document as Partial<Site>) });
+  const site = { ...emptySite("Imported site"), ...(document as Partial<Site>) };
+  const wrong = whatIsWrong(site);
+  if (wrong) throw new Error(`This file is no site: ${wrong}.`);
+  return clean(site);
+}
+
+/** What the page could not even show. Everything else is for the server's check to say. */
+function whatIsWrong(site: { [key in keyof Site]: unknown }): string | null {
+  const list = (value: unknown, of: (entry: unknown) => boolean) =>
+    Array.isArray(value) && value.every(of);
+  const isNumber = (value: unknown) => typeof value === "number" && Number.isFinite(value);
+  const isPoint = (value: unknown) => list(value, isNumber) && (value as unknown[]).length === 2;
+  const isLine = (value: unknown) => list(value, isPoint);
+  const has = (value: unknown, test: (entry: Record<string, unknown>) => boolean) =>
+    typeof value === "object" && value !== null && test(value as Record<string, unknown>);
+  if (typeof site.name !== "string") return "its name is no text";
+  if (!isLine(site.boundary)) return "its boundary is no list of points [x, y]";
+  if (!list(site.islands, isLine)) return "its islands are no lists of points [x, y]";
+  if (!list(site.walls, isLine)) return "its walls are no lists of points [x, y]";
+  if (!list(site.landmarks, (m) => has(m, ({ id, x, y }) => [id, x, y].every(isNumber))))
+    return "its landmarks are not all objects with id, x and y";
+  if (
+    !list(site.routes, (r) =>
+      has(r, ({ name, nodes }) => typeof name === "string" && isLine(nodes)),
+    )
+  )
+    return "its routes are not all objects with a name and nodes [x, y]";
+  const { start } = site;
+  if (start && !(list(start, isNumber) && [2, 3].includes((start as unknown[]).length)))
+    return "its start is not [x, y] or [x, y, heading]";
+  return null;
 }
 
 /** Without fields that say nothing: the server answers null where a landmark has no own size. */

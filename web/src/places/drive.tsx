@@ -11,6 +11,7 @@ import {
   length,
   percent,
   speed,
+  UNKNOWN,
   volts,
 } from "../core/format";
 import { saved } from "../state/draft";
@@ -95,7 +96,7 @@ function Pose({ now }: { now: Snapshot }) {
     <Section title="Position">
       <Facts>
         <Fact name="Estimated" age={ageOf(now, pose?.stamp)}>
-          {length(pose?.x)}, {length(pose?.y)}
+          {pose ? `${length(pose.x)}, ${length(pose.y)}` : UNKNOWN}
         </Fact>
         <Fact name="Heading">{degrees(pose?.heading)}</Fact>
         <Fact name="Uncertain by">

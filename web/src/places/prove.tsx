@@ -27,7 +27,7 @@ const OUTCOMES: Record<string, string> = {
   paused: "Ended early",
   timeout: "Ran out of time",
   failed: "Failed",
-  interrupted: "Interrupted: the service went down",
+  interrupted: "Interrupted",
 };
 
 const outcomeOf = (record: RunRecord): string =>

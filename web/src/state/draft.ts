@@ -199,6 +199,7 @@ export async function save(): Promise<boolean> {
   } catch (error) {
     if (error instanceof api.ApiError && error.status === 412 && base.id !== null) {
       conflict.value = await doing("Reading the other version", () => api.readSite(base.id!));
+      void refreshSites();
     } else {
       say(`Not saved. ${inWords(sentenceOf(error), sent)}`, "fault");
     }

@@ -38,7 +38,7 @@ export async function deleteSite(summary: SiteSummary): Promise<boolean> {
 export async function readFile(file: File): Promise<Site | null> {
   try {
     const document: unknown = JSON.parse(await file.text());
-    const site = isGeoJson(document) ? fromGeoJson(document) : asSite(document);
+    const site = asSite(isGeoJson(document) ? fromGeoJson(document) : document);
     return { ...site, name: site.name || file.name.replace(/\.(geo)?json$/i, "") };
   } catch (error) {
     const why = error instanceof SyntaxError ? "It is not JSON." : sentenceOf(error);

@@ -45,6 +45,7 @@ _SMALLEST = 0.008
 """Missed patches below this are left, m² for a tool of 0.4 m; scaled with its square."""
 
 
+@np.errstate(invalid="ignore", divide="ignore")  # GEOS sets these flags for nothing
 def plan_scan(
     site: Site,
     options: PlanOptions,

@@ -23,6 +23,7 @@ from polepilot.core.site import Site
 from polepilot.core.site_file import place
 
 
+@np.errstate(invalid="ignore", divide="ignore")  # GEOS sets these flags for nothing
 def plan_route(site: Site, route: str | Sequence[Point], options: PlanOptions) -> Plan:
     """The path from the start by way of the nodes of a named route, or of the given nodes.
 

@@ -18,10 +18,13 @@ from polepilot.core.planning.wording import in_words, measured_in_words
 from polepilot.core.site import Site, Start
 from polepilot.core.site_file import place
 
-MARGIN = 0.0003
-"""How much farther than the clearance the path stays away, so that chords of arcs keep it, m."""
+CHORD = 0.0003
+"""How far the chords of a rounded outline are inside of it, at most, m."""
 SLACK = 0.0002
 """How far outside the free space a line may seem to be through rounding, m."""
+MARGIN = CHORD + SLACK + 0.0001
+"""How much farther than the clearance the path stays away, so that it keeps it in spite of those
+and of the digits in which it is written, m."""
 POLE_GAP = 0.01
 """A pole whose surface is farther than this from everything stands free, m."""
 
@@ -64,7 +67,11 @@ class FreeSpace:
 
     def reachable(self) -> MultiPolygon:
         """The union of the clearance discs whose centres are in ``polygon``."""
-        return as_multi(self.polygon.buffer(self.clearance, quad_segs=quadrant(self.clearance)))
+        radius = self.clearance + MARGIN  # as much as the walls were grown by
+        discs = self.polygon.buffer(radius, quad_segs=quadrant(radius))
+        if not discs.is_valid:  # where arcs nearly touch each other, GEOS may let them cross
+            discs = shapely.make_valid(discs, method="structure", keep_collapsed=False)
+        return as_multi(discs)
 
     def nearest(self, point: geometry.Point) -> geometry.Point:
         """The place of the free space nearest to ``point``."""
@@ -187,6 +194,7 @@ def free_space(site: Site, options: PlanOptions) -> FreeSpace:
     )
 
 
+@np.errstate(invalid="ignore", divide="ignore")  # GEOS sets these flags for nothing
 def reachable_area(site: Site, options: PlanOptions) -> MultiPolygon:
     """The union of the clearance discs whose centres are connected to the start.
 
@@ -237,7 +245,7 @@ def _at_start(
     if distance > 0.001:
         notes.append(
             f"The start {place(start.position)} is nearer to a wall than "
-            f"{in_words(options.clearance)}; the path begins {in_words(distance)} away."
+            f"{in_words(options.clearance)}; the path begins {measured_in_words(distance)} away."
         )
     return home, Start(x, y, start.heading)
 
@@ -264,7 +272,7 @@ def _reflex(polygon: Polygon) -> list[geometry.Point]:
     return found
 
 
-def quadrant(radius: float, error: float = MARGIN) -> int:
+def quadrant(radius: float, error: float = CHORD) -> int:
     """Segments per quarter turn so that a buffer's chords are no farther than ``error`` inside."""
     if radius <= 2 * error:
         return 4

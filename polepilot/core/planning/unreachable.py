@@ -15,6 +15,7 @@ from polepilot.core.planning.wording import in_words
 SMALLEST = 0.05
 """Smaller pieces are not mentioned, m²."""
 _SLIVER = 0.003
+_GRID = 1e-4
 _MOST_REASONS = 25
 """The largest pieces are looked into one by one; a map with more has other problems."""
 
@@ -36,7 +37,7 @@ def unreachable_pieces(space: FreeSpace, reachable: MultiPolygon) -> tuple[Unrea
             reason = passages.reason(whole)
         else:
             reason = f"the robot needs {in_words(2 * space.clearance)} of width to get in"
-        pieces += [(simple, reason) for simple in _without_holes(whole)]
+        pieces += [(simple, reason) for simple in _on_grid(whole)]
     return tuple(
         Unreachable(_ring(piece), reason) for piece, reason in pieces if piece.area >= SMALLEST / 5
     )
@@ -107,6 +108,20 @@ def _without_holes(piece: Polygon) -> list[Polygon]:
     return done
 
 
+def _on_grid(piece: Polygon) -> list[Polygon]:
+    """A polygon without holes whose corners are whole multiples of ``_GRID``.
+
+    Rounding corner by corner would let the two sides of a slit along a wall cross.
+    """
+    parts = _without_holes(piece.simplify(0.002))
+    for _ in range(3):
+        parts = [q for part in parts for q in polygons(shapely.set_precision(part, _GRID))]
+        if not any(part.interiors for part in parts):
+            break
+        parts = [half for part in parts for half in _without_holes(part)]
+    return parts
+
+
 def _ring(piece: Polygon) -> Polyline:
-    points = np.asarray(piece.simplify(0.002).exterior.coords, dtype=float)[:-1, :2]
+    points = np.asarray(piece.exterior.coords, dtype=float)[:-1, :2]
     return tuple((round(float(x), 4), round(float(y), 4)) for x, y in points)

@@ -11,5 +11,5 @@ def in_words(length: float) -> str:
 
 
 def measured_in_words(length: float) -> str:
-    """As ``in_words``, to a whole centimetre: what was measured is not known more exactly."""
-    return in_words(round(length, 2))
+    """As ``in_words``, to a whole centimetre from one centimetre on."""
+    return in_words(round(length, 2 if length >= 0.01 else 3))

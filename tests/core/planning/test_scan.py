@@ -9,7 +9,7 @@ import pytest
 from core.planning import judge, maps
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely import MultiPolygon, Point, Polygon
+from shapely import LineString, MultiPolygon, Point, Polygon
 
 from polepilot.core.errors import PlanError, SiteError
 from polepilot.core.plan import Plan
@@ -178,3 +178,11 @@ def test_a_robot_that_fits_nowhere() -> None:
     assert plan.predicted.coverage > 0.9
     with pytest.raises(PlanError, match="too large"):
         plan_scan(maps.site(maps.box(0, 0, 9000, 9000)), PlanOptions())
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.6])
+def test_the_clearance_is_kept_as_written(radius: float) -> None:
+    """Chords, rounding and all: not even a hundredth of a millimetre is missing."""
+    site = maps.pillars(9, seed=5)
+    document = plan_scan(site, PlanOptions(min_turn_radius=radius)).to_json()
+    assert site.obstacles().distance(LineString(document["path"])) >= 0.2

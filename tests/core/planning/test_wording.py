@@ -17,3 +17,4 @@ def test_centimetres_below_ten_metres(length: float, words: str) -> None:
 
 def test_measured_lengths_are_whole_centimetres() -> None:
     assert measured_in_words(0.1037) == "10 cm"
+    assert measured_in_words(0.0042) == "0.4 cm"

@@ -130,7 +130,15 @@ class ObstacleAvoidance:
 
     def blocked_for(self, now: float) -> float:
         """Seconds since the robot last got ahead; 0 unless something is in the way."""
-        return 0.0 if self._blocked_since is None else now - self._blocked_since
+        if self._blocked_since is None or not self.active:
+            return 0.0
+        return now - self._blocked_since
+
+    def make_room(self, now: float, pose: Pose2D) -> None:
+        """Back off a little, if there is room: the board holds the robot before something."""
+        self._backing = BACK_OFF
+        if self._blocked_since is None:
+            self._blocked_since, self._blocked_at = now, pose.position
 
     def _stood_for(self, now: float) -> float:
         return 0.0 if self._standing_since is None else now - self._standing_since
@@ -154,9 +162,11 @@ class ObstacleAvoidance:
         pose = estimate.pose
         self._memory.observe(now, pose, readings, estimate.position_sigma, estimate.heading_sigma)
         command = self._choose(now, dt, pose, tracker)
-        astray = abs(tracker.deviation) > ASTRAY
+        astray = abs(tracker.deviation) > ASTRAY or not tracker.aligned
         if not self._safe(pose, command, astray):
             self.reason = "Waiting: something is too close ahead."
+            if command.speed > 0 and self._stood_for(now) > BACK_OFF_AFTER:
+                self._backing = BACK_OFF
             command = DriveCommand(0.0, command.steering)
         self._watch(now, pose, command)
         self._last = command
@@ -164,8 +174,10 @@ class ObstacleAvoidance:
 
     def _watch(self, now: float, pose: Pose2D, command: DriveCommand) -> None:
         """For how long has it been standing, and has it not come away from here?"""
+        if self._blocked_since is not None and pose.distance_to(self._blocked_at) > COME_AWAY:
+            self._blocked_since = None
         if not self.active:
-            self._standing_since = self._blocked_since = None
+            self._standing_since = None
             return
         if self._standing_since is not None:
             # A short twitch after each new plan is no progress.
@@ -173,11 +185,8 @@ class ObstacleAvoidance:
                 self._standing_since = None
         elif command.speed == 0:
             self._standing_since, self._stood_at = now, pose.position
-        if self._blocked_since is None:
-            if command.speed == 0:
-                self._blocked_since, self._blocked_at = now, pose.position
-        elif pose.distance_to(self._blocked_at) > COME_AWAY:
-            self._blocked_since = None
+        if self._blocked_since is None and command.speed == 0:
+            self._blocked_since, self._blocked_at = now, pose.position
 
     def _choose(self, now: float, dt: float, pose: Pose2D, tracker: PathTracker) -> DriveCommand:
         if self._backing > 0:
@@ -303,6 +312,8 @@ class ObstacleAvoidance:
         places = np.searchsorted(along, wanted)
         places = places[places < len(points)]
         places = places[free[places]]
+        if self.blocked_for(now) <= PATIENCE:
+            places = places[_onward(pose, points, places)]
         x, y = obstacle.position
         where = f"at {x:.1f}, {y:.1f}"
         for side in sides:
@@ -400,9 +411,17 @@ class ObstacleAvoidance:
             self._backing = 0.0
             self._standing_since = None
             return STAND
-        self.reason = "Backing off to make room for passing an obstacle."
+        self.reason = "Backing off to make room."
         self._away = True
         return DriveCommand(-0.12, 0.0)
+
+
+def _onward(pose: Pose2D, points: Floats, places: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which places can be arrived at along the path, not against it: the next pass comes back."""
+    offset = points[places] - pose.position
+    along = points[np.minimum(places + 1, len(points) - 1)] - points[np.maximum(places - 1, 0)]
+    onward: NDArray[np.bool_] = (offset * along).sum(axis=1) > 0
+    return onward
 
 
 def _stays(good: NDArray[np.bool_]) -> NDArray[np.bool_]:

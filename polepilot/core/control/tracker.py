@@ -53,6 +53,8 @@ class PathTracker:
         self._along = 0.0
         self._deviation = 0.0
         self._distance = 0.0
+        self._against = 0.0
+        self._joining = False
         self._hold: float | None = 0.0
         self._speed = 0.0
         self._steering = 0.0
@@ -96,6 +98,11 @@ class PathTracker:
         return 1 if self.done else self._stretches[self._index].gear
 
     @property
+    def aligned(self) -> bool:
+        """Whether the robot points along the path, within 45 degrees, seen in its gear."""
+        return self._against < 0.3
+
+    @property
     def off_route(self) -> bool:
         """Whether following has failed and the path should be planned anew or taken up again."""
         return bool(self.off_route_reason)
@@ -105,7 +112,9 @@ class PathTracker:
         """Why, for a person; empty while all is well."""
         if self.done:
             return ""
-        if self._distance > OFF_ROUTE:
+        # Who comes from a detour may have to turn round first.
+        turning = 2.5 * self._vehicle.min_turn_radius + 0.30 if self._joining else 0.0
+        if self._distance > max(OFF_ROUTE, turning):
             return f"the robot is {100 * self._distance:.0f} cm away from its path"
         if self._idle_way > math.tau * self._vehicle.min_turn_radius * 1.15 + 0.8:
             return f"{self._idle_way:.1f} m driven without getting ahead on the path"
@@ -128,6 +137,7 @@ class PathTracker:
             self._along = progress - self._stretches[self._index].begin
         self._begin_stretch(standing=abs(self._speed) < CREEP)
         self._distance = 0.0
+        self._joining = True
         self._roll(rolling)
 
     def take_up(self) -> None:
@@ -255,9 +265,12 @@ class PathTracker:
         here = along[best] if low + best == last and along[best] > 0 else inside[best]
         self._along = max(self._along, float(stretch.along[low + best] + here))
         self._deviation = float(aside[best])
+        self._against = float(against[best])
         self._distance = math.sqrt(float(distance[best]))
         if low + best == last and along[best] > lengths[best]:
             self._distance = abs(self._deviation)
+        if self._distance < 0.10 and self.aligned:
+            self._joining = False
 
     def _steer(self, stretch: Stretch, pose: Pose2D) -> float:
         """The front wheel's angle that leads `base_link` through the target."""

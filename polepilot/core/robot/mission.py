@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -9,7 +10,7 @@ from shapely import MultiPolygon
 from shapely.geometry import mapping
 
 from polepilot.core.command import STAND, DriveCommand
-from polepilot.core.control.avoidance import ObstacleAvoidance
+from polepilot.core.control.avoidance import BACK_OFF_AFTER, ObstacleAvoidance
 from polepilot.core.control.tracker import PathTracker
 from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.observation import PoseEstimate
@@ -35,6 +36,8 @@ GAP = 0.3
 """Seconds without driving after which the robot begins again from standing."""
 HELD_PATIENCE = 0.6
 """So long the board may hold the robot before a wall until that counts, seconds."""
+HELD_GAP = 0.5
+"""A range at the limit comes and goes; so long after the last time it still counts, seconds."""
 HELD_REST = 0.08
 """Metres that the board may cut off the end of a stretch: it keeps more room ahead of the body
 than a plan has to."""
@@ -97,6 +100,7 @@ class Mission:
         self._last: Pose2D | None = None
         self._driven_at = now
         self._held_since: float | None = None
+        self._held_at = -math.inf
         self._travelled = 0.0
 
     @property
@@ -139,7 +143,7 @@ class Mission:
             return Step(STAND, self._tracker.target, hold)
         command = self._avoidance.update(now, dt, estimate, proximity, self._tracker)
         target = self._avoidance.target or self._tracker.target
-        if hold := self._too_close(now, command, held):
+        if hold := self._too_close(now, estimate.pose, command, held):
             return Step(STAND, target, hold)
         return Step(command, target, self._avoidance.reason)
 
@@ -149,9 +153,11 @@ class Mission:
         self._tracker.take_up()
         self._avoidance.take_up()
 
-    def _too_close(self, now: float, command: DriveCommand, held: bool) -> str:
+    def _too_close(self, now: float, pose: Pose2D, command: DriveCommand, held: bool) -> str:
         """Why it waits for the board, which holds it; at the end of a stretch it does not."""
-        if not held or command.speed <= 0:
+        if held:
+            self._held_at = now
+        if now - self._held_at > HELD_GAP or command.speed <= 0:
             self._held_since = None
             return ""
         if self._held_since is None:
@@ -161,6 +167,8 @@ class Mission:
         if not self._avoidance.active and self._tracker.cut_short(HELD_REST):
             self._held_since = None
             return ""
+        if now - self._held_since > BACK_OFF_AFTER:
+            self._avoidance.make_room(now, pose)
         self._tracker.take_up()
         return "Waiting: something stands closer ahead than the robot may drive to."
 

@@ -34,13 +34,12 @@ def replay(
     from polepilot.core.observation import Detection
     from polepilot.core.robot.dataset import FrameFile, read_dataset
     from polepilot.core.robot.replay import replay as run
+    from polepilot.core.robot.replay import smooth as smoothed_poses
     from polepilot.core.robot.replay import write_results
     from polepilot.core.trajectory import Trajectory, heading_errors, position_errors
     from polepilot.core.vision.detector import LandmarkDetector
     from polepilot.core.vision.images import read_image
 
-    if smooth:
-        raise InputError("--smooth is not available in this version: leave it out.")
     if method not in ("ekf", "paper"):
         raise InputError(f"--method is {method!r}: expected 'ekf' or 'paper'.")
     recording = read_dataset(dataset)
@@ -76,7 +75,7 @@ def replay(
     if len(unusable) == result.frames:
         # A picture may be lost; with all of them lost it is no recording.
         raise DatasetError(f"{dataset}: none of its pictures can be used; {unusable[0]}")
-    write_results(result, out)
+    write_results(result, out, smoothed_poses(recording, result) if smooth else None)
     if json:
         typer.echo(json_module.dumps(result.to_json()))
         return

@@ -7,6 +7,7 @@ import tempfile
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from polepilot.core.observation import (
     Status,
 )
 from polepilot.core.robot.dataset import Dataset, FrameFile
+from polepilot.core.robot.smoother import Picture, Smoother
 from polepilot.core.trajectory import format_tum
 
 See = Callable[[FrameFile], Sequence[Detection]]
@@ -32,6 +34,8 @@ See = Callable[[FrameFile], Sequence[Detection]]
 
 _CLOCK_JUMP = 2.0
 """Seconds without any sample after which nobody knows how the robot has moved."""
+_SEARCH = 10.0
+"""Pictures so long before a pose was found may have led to it, seconds."""
 _COUNT = math.radians(270) / 1023
 """One step of the potentiometer's converter, radians."""
 
@@ -45,6 +49,14 @@ class ReplayResult:
     measured: list[tuple[float, Pose2D]] = field(default_factory=list)
     deadreckoned: list[tuple[float, Pose2D]] = field(default_factory=list)
     events: list[LocalizerEvent] = field(default_factory=list)
+    pictures: list[Picture] = field(default_factory=list)
+    """What was seen when."""
+    found: list[int] = field(default_factory=list)
+    """Which estimates are the first ones after the pose was found, or found anew."""
+    moved: frozenset[int] = frozenset()
+    """Landmarks that do not stand where the map has them."""
+    lags: tuple[float, float] = (0.0, 0.0)
+    """Time constants of motors and servo, as far as they were learnt, seconds."""
 
     def to_json(self) -> dict[str, Any]:
         """The ``replay --json`` document."""
@@ -139,12 +151,17 @@ def replay(
             pan.add(sample)
             continue
         result.frames += 1
-        localizer.add_measurements(_look(sample, see, pan, result))
+        told = len(result.events)
+        seen_now = _look(sample, see, pan, result)
+        result.pictures.append((stamp, seen_now))
+        localizer.add_measurements(seen_now)
         if localizer.status is Status.LOST:
             result.events += localizer.events()
             localizer.refix(localizer.reason)
         estimate = localizer.estimate(stamp)
         result.events += localizer.events()
+        if any(event.code in ("fixed", "refixed") for event in result.events[told:]):
+            result.found.append(len(result.estimates))
         if estimate is not None:
             result.estimates.append(estimate)
             seen_at, seen = localizer.measured or (stamp, estimate.pose)
@@ -157,10 +174,58 @@ def replay(
             result.deadreckoned.append(reckoned)
         if progress is not None:
             progress(result.frames)
+    result.moved = frozenset(localizer.moved_landmarks)
+    result.lags = (localizer.history.speed_lag, localizer.history.steering_lag)
     return result
 
 
-def write_results(result: ReplayResult, out: Path) -> None:
+def smooth(dataset: Dataset, result: ReplayResult) -> list[tuple[float, Pose2D]]:
+    """The offline best: the pose at each of the result's estimates from the whole recording.
+
+    Wherever the pose was lost and found again a new stretch begins, which knows nothing of the
+    one before; pictures from which it was found count for it.
+    """
+    settings = LocalizerSettings()
+    half_range = max(abs(dataset.pan_minimum), abs(dataset.pan_maximum))
+    motors, servo = result.lags
+    history = OdometryHistory(
+        dataset.vehicle.wheelbase, speed_lag=motors, steering_lag=servo, span=math.inf
+    )
+    for sample in dataset.samples:
+        if isinstance(sample, Odometry):
+            history.add(sample)
+    smoother = Smoother(
+        {k: mark for k, mark in dataset.landmarks.items() if k not in result.moved},
+        history,
+        dataset.camera.forward,
+        replace(settings.noise, pan_range=half_range),
+        settings.gate,
+    )
+    found: list[tuple[float, Pose2D]] = []
+    begun = -math.inf
+    for begin, end in pairwise([*result.found, len(result.estimates)]):
+        stretch = result.estimates[begin:end]
+        if not stretch:
+            continue
+        first, last = stretch[0].stamp, stretch[-1].stamp
+        begun = max(begun, first - _SEARCH)
+        pictures = [p for p in result.pictures if begun < p[0] <= last]
+        jumps = [
+            index
+            for index, ((before, _), (after, _)) in enumerate(pairwise(pictures), start=1)
+            if after <= first and after - before > _CLOCK_JUMP
+        ]
+        pictures = pictures[jumps[-1] if jumps else 0 :]
+        begun = last
+        poses = smoother.smooth(pictures, stretch[0].pose, first)
+        known = {stamp: pose for (stamp, _), pose in zip(pictures, poses, strict=True)}
+        found += [(one.stamp, known.get(one.stamp, one.pose)) for one in stretch]
+    return found
+
+
+def write_results(
+    result: ReplayResult, out: Path, smoothed: Sequence[tuple[float, Pose2D]] | None = None
+) -> None:
     """Write the trajectories into ``out`` (made if need be), all of them or none.
 
     Raises:
@@ -178,6 +243,8 @@ def write_results(result: ReplayResult, out: Path) -> None:
         "deadreckoned.tum": format_tum(*_columns(result.deadreckoned)),
         "estimated.cov": "".join(covariance),
     }
+    if smoothed is not None:
+        files["smoothed.tum"] = format_tum(*_columns(smoothed))
     try:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=out, prefix=".replay-") as folder:
@@ -219,5 +286,5 @@ def _look(frame: FrameFile, see: See, pan: PanTrack, result: ReplayResult) -> li
     ]
 
 
-def _columns(rows: list[tuple[float, Pose2D]]) -> tuple[list[float], list[Pose2D]]:
+def _columns(rows: Sequence[tuple[float, Pose2D]]) -> tuple[list[float], list[Pose2D]]:
     return [stamp for stamp, _ in rows], [pose for _, pose in rows]

@@ -14,8 +14,14 @@ from core.localization.generator import FORWARD, WHEELBASE, Recording, record
 from polepilot.core.errors import DatasetError, ImageError
 from polepilot.core.observation import Detection, Odometry, PanReading
 from polepilot.core.robot.dataset import FrameFile, read_dataset
-from polepilot.core.robot.replay import PanTrack, ReplayResult, replay, write_results
-from polepilot.core.trajectory import position_errors, read_tum, write_tum
+from polepilot.core.robot.replay import PanTrack, ReplayResult, replay, smooth, write_results
+from polepilot.core.trajectory import (
+    Trajectory,
+    heading_errors,
+    position_errors,
+    read_tum,
+    write_tum,
+)
 
 DOCUMENT: dict[str, Any] = {
     "camera": {
@@ -122,6 +128,42 @@ def test_the_replay_is_causal(tmp_path: Path) -> None:
     for a, b in zip(whole.estimates, part.estimates, strict=False):
         assert a.stamp == b.stamp
         assert a.pose == b.pose
+
+
+def test_looking_back_is_better_than_looking_ahead(tmp_path: Path) -> None:
+    recorded = Recorded(tmp_path / "run", record(31, 40.0, standing=0.0))
+    dataset = read_dataset(tmp_path / "run")
+    result = replay(dataset, recorded.see)
+    write_results(result, tmp_path / "out", smooth(dataset, result))
+    estimated = read_tum(tmp_path / "out" / "estimated.tum")
+    smoothed = read_tum(tmp_path / "out" / "smoothed.tum")
+    assert smoothed.stamps == pytest.approx(estimated.stamps)
+    assert dataset.truth is not None
+    ahead, back = (position_errors(dataset.truth, track) for track in (estimated, smoothed))
+    assert back.mean < 0.8 * ahead.mean
+    assert back.max < ahead.max
+    turned = [heading_errors(dataset.truth, track).mean for track in (smoothed, estimated)]
+    assert turned[0] < turned[1]
+
+
+def test_what_is_smoothed_does_not_jump_clocks(tmp_path: Path) -> None:
+    recorded = Recorded(tmp_path / "run", record(33, 35.0))
+    path = tmp_path / "run" / "samples.jsonl"
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    path.write_text("\n".join(json.dumps(n) for n in lines if not 9.0 < n["t"] < 14.0))
+    dataset = read_dataset(tmp_path / "run")
+    result = replay(dataset, recorded.see)
+    assert len(result.found) == 2
+    smoothed = smooth(dataset, result)
+    assert [stamp for stamp, _ in smoothed] == [e.stamp for e in result.estimates]
+    track = Trajectory(np.array([t for t, _ in smoothed]), np.array([p for _, p in smoothed]))
+    assert dataset.truth is not None
+    assert position_errors(dataset.truth, track).mean < 0.02
+
+
+def test_nothing_seen_is_nothing_smoothed(tmp_path: Path) -> None:
+    dataset = read_dataset(write(tmp_path / "run"))
+    assert smooth(dataset, replay(dataset, lambda _: [])) == []
 
 
 def test_an_unreadable_picture_is_left_out_and_said(tmp_path: Path) -> None:

@@ -80,6 +80,18 @@ def test_pictures_become_a_pose(
     assert abs(poses[-1, 2] - POSE.heading) < math.radians(0.7)
 
 
+def test_smoothed_poses_are_written_too(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["replay", str(recording), "--out", str(tmp_path), "--smooth", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    poses = read_tum(tmp_path / "smoothed.tum").poses
+    assert len(poses) == document["poses"]
+    # A robot that stands, looked back upon, stands.
+    assert np.ptp(poses[:, :2], axis=0).max() < 0.002
+    assert math.dist(poses[0, :2], POSE.position) < 0.04
+
+
 def test_a_table_is_printed_without_json(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -92,7 +104,6 @@ def test_a_table_is_printed_without_json(
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["--smooth"], "--smooth is not available"),
         (["--method", "magic"], "expected 'ekf' or 'paper'"),
     ],
 )

@@ -21,6 +21,7 @@ const NAMES = {
   plan: "--plan",
   poleBright: "--pole-bright",
   poleDark: "--pole-dark",
+  poleEdge: "--pole-edge",
   poleUnseen: "--pole-unseen",
   obstacle: "--obstacle",
 } as const;

@@ -152,7 +152,7 @@ export function paintLandmark(
     ctx.fillStyle = code[i] === "1" ? bright : palette.poleDark;
     ctx.fillRect(left, top + i * stripe, POLE_WIDTH, stripe + 0.5);
   }
-  ctx.strokeStyle = chosen ? palette.accent : palette.poleDark;
+  ctx.strokeStyle = chosen ? palette.accent : palette.poleEdge;
   ctx.lineWidth = chosen ? 2.5 : 1;
   ctx.strokeRect(left, top, POLE_WIDTH, POLE_HEIGHT);
   if (suspected) {

@@ -2,17 +2,34 @@
 
 import { signal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
-import { useRef, useState } from "preact/hooks";
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { Check } from "../places/check";
 import { Draw } from "../places/draw";
 import { Drive } from "../places/drive";
 import { Prove } from "../places/prove";
 import { SetUp } from "../places/setup";
 import { PLACE_NAMES } from "../core/address";
+import { selection } from "../state/draft";
 import { location } from "../state/location";
 import { IconButton } from "../ui/controls";
 import { PrimaryAction } from "./primary";
 import { StripLine } from "./timestrip";
+
+/** The panel's contents, from their beginning whenever it shows something else. */
+function Body() {
+  const box = useRef<HTMLDivElement>(null);
+  const { place, id } = location.value;
+  const at = selection.value;
+  const shown = `${place} ${id} ${at ? `${at.kind}${at.index}` : ""}`;
+  useLayoutEffect(() => {
+    if (box.current) box.current.scrollTop = 0;
+  }, [shown]);
+  return (
+    <div class="inspector-body" ref={box}>
+      <Content />
+    </div>
+  );
+}
 
 const collapsed = signal(false);
 
@@ -45,11 +62,7 @@ export function Inspector() {
           }}
         />
       </div>
-      {!collapsed.value && (
-        <div class="inspector-body">
-          <Content />
-        </div>
-      )}
+      {!collapsed.value && <Body />}
     </aside>
   );
 }
@@ -116,9 +129,7 @@ export function Sheet() {
       <div class="sheet-primary">
         <PrimaryAction />
       </div>
-      <div class="inspector-body">
-        <Content />
-      </div>
+      <Body />
     </Handle>
   );
 }

@@ -7,7 +7,7 @@ import { check, site } from "../state/draft";
 import { finishSketch, pointer, pressKey, resolution, sketch } from "../state/editor";
 import { location } from "../state/location";
 import { hush, notice, work } from "../state/notice";
-import { plan, planning } from "../state/plan";
+import { plan, planning, waiting } from "../state/plan";
 import { mission, simulationTool, snapshot, stale } from "../state/robot";
 import { moment, play, playing, run, span } from "../state/runs";
 import { Button, IconButton } from "../ui/controls";
@@ -109,7 +109,8 @@ function drawingLine(tool: Sketch | null): string {
 /** What belongs to the place at the moment. */
 export function StripLine() {
   const said = notice.value;
-  const busy = planning.value ?? work.value;
+  const waits = waiting.value === null ? null : "The robot looks for its place, then it starts";
+  const busy = planning.value ?? work.value ?? waits;
   if (busy) {
     return (
       <div class="strip-line" role="status">

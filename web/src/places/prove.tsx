@@ -8,6 +8,7 @@ import { saved } from "../state/draft";
 import { go, location } from "../state/location";
 import { planPending } from "../state/plan";
 import { mission } from "../state/robot";
+import { sites } from "../state/sites";
 import {
   KIND_WORDS,
   missedArea,
@@ -36,7 +37,11 @@ const outcomeOf = (record: RunRecord): string =>
 const jobOf = (record: RunRecord): string =>
   record.mode === "scan" ? "Scan" : `Route “${record.route ?? ""}”`;
 
-function RunRow({ record }: { record: RunRecord }) {
+/** The name of the run's site; one that was deleted has none any more. */
+const siteOf = (record: RunRecord): string =>
+  sites.value?.find(({ id }) => id === record.site_id)?.name || "a deleted site";
+
+function RunRow({ record, several }: { record: RunRecord; several: boolean }) {
   return (
     <li>
       <button
@@ -44,7 +49,10 @@ function RunRow({ record }: { record: RunRecord }) {
         class="run-row"
         onClick={() => go({ place: "prove", id: record.id, detail: null })}
       >
-        <strong>{jobOf(record)}</strong>
+        <strong>
+          {jobOf(record)}
+          {several && `, ${siteOf(record)}`}
+        </strong>
         <span class="number quiet">{clock(record.started_at)}</span>
         <span>
           {outcomeOf(record)}
@@ -69,10 +77,11 @@ function RunList() {
       </Empty>
     );
   }
+  const several = new Set(list?.map((record) => record.site_id)).size > 1;
   return (
     <ul class="runs" aria-label="Runs">
       {list?.map((record) => (
-        <RunRow key={record.id} record={record} />
+        <RunRow key={record.id} record={record} several={several} />
       ))}
     </ul>
   );
@@ -151,6 +160,7 @@ function Missed({ record }: { record: RunDetail }) {
     <Button
       kind="primary"
       disabled={mission.value !== null}
+      title={mission.value === null ? undefined : "A run is going on: end it first."}
       onClick={() => void planPending(record.id, record.site_id)}
     >
       Cover what was missed

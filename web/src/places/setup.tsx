@@ -10,7 +10,7 @@ const THEME_WORDS: Record<Theme, string> = {
   auto: "Like this device",
   light: "Light",
   dark: "Dark",
-  sun: "Sun: black on white",
+  sun: "Bright sun",
 };
 
 const LINK_WORDS: Record<string, string> = {

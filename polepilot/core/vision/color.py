@@ -49,9 +49,7 @@ def linear(patch: Image) -> Floats:
     Edges are found in linear light because pixels average light, not grey levels. Red alone: the
     difference of two channels holds no brightness, which is what JPEG keeps sharp.
     """
-    if patch.ndim == 2:
-        return _LINEAR[patch]
-    return _LINEAR[patch[:, :, 2]]
+    return _LINEAR.take(patch if patch.ndim == 2 else patch[:, :, 2], mode="clip")
 
 
 def bright(signal: Bytes) -> Bytes:

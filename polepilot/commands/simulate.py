@@ -42,7 +42,7 @@ def simulate(
     from polepilot.commands.plan import make_plan, naming_file, naming_options, parse_start
     from polepilot.commands.progress import mission_progress
     from polepilot.commands.simulation import Simulation
-    from polepilot.core.errors import InputError, RefusedError
+    from polepilot.core.errors import PolepilotError, RefusedError
     from polepilot.core.planning.options import PlanOptions
     from polepilot.core.site import read_site
     from polepilot.server.settings import load_settings
@@ -66,10 +66,7 @@ def simulate(
         )
     with naming_file(site_file):
         plan = make_plan(site, mode, route, options)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"--out {out}: cannot be made ({error.strerror}).") from error
+    _check_writable(out)
     simulation = Simulation.build(
         site,
         plan,
@@ -87,6 +84,23 @@ def simulate(
         sys.stdout.write(json.dumps(result.to_json()) + "\n")
     else:
         sys.stdout.write(_table(result.to_json()))
+    if simulation.log_error is not None:
+        raise PolepilotError(f"{out / 'run.mcap'}: is incomplete ({simulation.log_error}).")
+
+
+def _check_writable(out: Path) -> None:
+    """A run takes minutes: where it cannot be kept is said before it."""
+    from polepilot.commands.simulation import FILES
+    from polepilot.core.errors import InputError
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for name in FILES:
+            (out / name).open("ab").close()
+    except OSError as error:
+        raise InputError(
+            f"--out {out}: cannot be written: {error.filename}: {error.strerror}."
+        ) from error
 
 
 def _table(result: dict[str, object]) -> str:

@@ -39,6 +39,8 @@ TICK = 0.02
 GIVE_UP_PAUSED = 5.0
 """A paused robot waits for a person; here there is none."""
 GIVE_UP_LOST = 60.0
+FILES = ("real.tum", "estimated.tum", "measured.tum", "target.csv", "run.mcap")
+"""What a run leaves in its folder."""
 
 
 @dataclass(slots=True)
@@ -160,6 +162,11 @@ class Simulation:
         robot = Robot(settings, sensor, world.link)
         recorder = Recorder(log, witness=lambda: world.truth)
         return cls(site, plan, world, robot, recorder)
+
+    @property
+    def log_error(self) -> Exception | None:
+        """Why the log is incomplete, where it is."""
+        return self._recorder.error
 
     def step(self) -> Snapshot:
         """Advance world and robot by one tick."""

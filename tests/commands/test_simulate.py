@@ -119,3 +119,15 @@ def test_a_start_that_is_asked_for_counts_for_the_robot_too(
     simulate(capfd, str(DEMO), *words, "--start", "4,1,2.5", "--out", str(tmp_path))
     first = read_tum(tmp_path / "real.tum").poses[0]
     assert first == pytest.approx((4.0, 1.0, 2.5), abs=0.01)
+
+
+@pytest.mark.parametrize("name", ["real.tum", "run.mcap"])
+def test_a_folder_that_cannot_be_written_is_said_before_the_run(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str
+) -> None:
+    (tmp_path / name).mkdir()
+    assert run(["simulate", str(DEMO), "--mode", "scan", "--out", str(tmp_path), "--json"]) == 2
+    told = capfd.readouterr()
+    assert told.out == ""
+    assert told.err.count("\n") == 1
+    assert name in told.err

@@ -7,13 +7,16 @@
 | NotFoundError | 404 |
 | PreconditionError | 412, or 428 where the header is missing |
 | DeviceError | 503 |
+| no room left on the disk | 507, code ``disk_full`` |
 | a body, path or query that does not fit the schema | 422, the field named |
 | anything else | 500, code ``internal``, logged |
 """
 
 from __future__ import annotations
 
+import errno
 import math
+import sqlite3
 from collections.abc import Mapping
 from http import HTTPStatus
 from typing import Any
@@ -155,6 +158,25 @@ async def _on_http_error(_: Request, error: Exception) -> JSONResponse:
     return problem(error.status_code, detail, code=code, headers=error.headers)
 
 
+async def _on_disk_error(request: Request, error: Exception) -> JSONResponse:
+    if not is_disk_full(error):
+        return await _on_unknown_error(request, error)
+    log.error("the disk is full", path=request.url.path, error=str(error))
+    return problem(
+        507,
+        "The disk is full: this was not kept.",
+        code="disk_full",
+        remedy="Make room on the disk of the robot's computer and try again.",
+    )
+
+
+def is_disk_full(error: BaseException) -> bool:
+    """Whether there is no room left for what was to be written."""
+    if isinstance(error, sqlite3.Error):
+        return getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL
+    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
 async def _on_unknown_error(request: Request, error: Exception) -> JSONResponse:
     log.error("request failed", path=request.url.path, error=str(error), exc_info=error)
     return problem(
@@ -170,4 +192,6 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(PolepilotError, _on_polepilot_error)
     app.add_exception_handler(RequestValidationError, _on_validation_error)
     app.add_exception_handler(HTTPException, _on_http_error)
+    app.add_exception_handler(sqlite3.Error, _on_disk_error)
+    app.add_exception_handler(OSError, _on_disk_error)
     app.add_exception_handler(Exception, _on_unknown_error)

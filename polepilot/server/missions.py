@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import sqlite3
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -239,6 +240,13 @@ class Missions:
         site_row = await run_in_threadpool(
             self._store.site_as_planned, plan.site_id, plan.site_version
         )
+        landmarks = len(site_row.document.get("landmarks", ()))
+        if landmarks < LEAST_LANDMARKS:
+            raise RefusedError(
+                f"The site has {landmarks} of the two landmarks that the robot needs at least.",
+                code="no_landmarks",
+                remedy="Place at least two landmarks.",
+            )
         if self._loaded is None or self._loaded.id != plan.site_id:
             raise RefusedError(
                 "The plan is for another site than the robot works on.",
@@ -250,13 +258,6 @@ class Missions:
                 "The site has changed since it was planned.",
                 code="site_changed",
                 remedy="Plan again.",
-            )
-        landmarks = len(site_row.document.get("landmarks", ()))
-        if landmarks < LEAST_LANDMARKS:
-            raise RefusedError(
-                f"The site has {landmarks} of the two landmarks that the robot needs at least.",
-                code="no_landmarks",
-                remedy="Place at least two landmarks.",
             )
         driven = await run_in_threadpool(plan_of, plan)
         self._refuse_if_turned(driven, plan.site_id)
@@ -322,7 +323,8 @@ class Missions:
             if self._outdated and self._loaded is not None:
                 row = self._store.site(self._loaded.id)
                 self._take_over(row)
-        except (PolepilotError, OSError) as error:
+        except (PolepilotError, OSError, sqlite3.Error) as error:
+            # The next start of the service works it out from the log.
             log.error("a run's end was not kept", run=summary.run_id, error=str(error))
 
     def _take_over(self, row: SiteRow) -> None:

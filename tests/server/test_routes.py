@@ -140,6 +140,24 @@ class TestSites:
         again = client.post(f"{API}/sites", json=geojson)
         assert again.json()["site"] == record["site"]
 
+    def test_a_full_disk_is_said_and_harms_nothing(
+        self, client: TestClient, services: Services
+    ) -> None:
+        record = add_square(client)
+        database = services.store._db
+        pages = database.execute("PRAGMA page_count").fetchone()[0]
+        database.execute(f"PRAGMA max_page_count = {pages}")
+        walls = [[[1 + 0.001 * n, 1], [2, 2 + 0.001 * n]] for n in range(2000)]
+        large = {**SQUARE, "walls": walls}
+        etag = {"If-Match": f'"v{record["version"]}"'}
+        address = f"{API}/sites/{record['id']}"
+        for _ in range(2):
+            document = problem(client.put(address, json=large, headers=etag), 507, "disk_full")
+            assert "room" in document["remedy"]
+        assert client.get(address).json() == record
+        database.execute("PRAGMA max_page_count = 1000000")
+        assert client.put(address, json=large, headers=etag).status_code == 200
+
     def test_one_key_adds_one_site(self, client: TestClient) -> None:
         headers = {"Idempotency-Key": "abc"}
         first = client.post(f"{API}/sites", json=SQUARE, headers=headers).json()
@@ -332,6 +350,13 @@ class TestMissions:
         plan = services.store.add_plan(
             services.store.site(site_id), "route", "Line", None, plan_document()
         )
+        problem(client.post(f"{API}/missions", json={"plan_id": plan.id}), 409, "no_landmarks")
+
+    def test_one_landmark_is_named_before_the_site_is_loaded(
+        self, client: TestClient, services: Services
+    ) -> None:
+        site = services.store.site(add_square(client, landmarks=[])["id"])
+        plan = services.store.add_plan(site, "route", "Line", None, plan_document())
         problem(client.post(f"{API}/missions", json={"plan_id": plan.id}), 409, "no_landmarks")
 
     def test_an_edit_during_a_mission_waits_for_its_end(

@@ -15,7 +15,7 @@ import { go, location } from "./state/location";
 import { about } from "./state/robot";
 import { refreshSites, sites } from "./state/sites";
 
-const narrow = window.matchMedia("(max-width: 719px)");
+const narrow = window.matchMedia("(max-width: 819px)");
 const phone = signal(narrow.matches);
 narrow.addEventListener("change", () => {
   phone.value = narrow.matches;

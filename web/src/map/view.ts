@@ -57,7 +57,7 @@ new EditPointer().attach(map);
 
 /** What the panels leave free: top, right, bottom, left. */
 function padding(): [number, number, number, number] {
-  return window.innerWidth < 720
+  return window.innerWidth < 820
     ? [164, 24, Math.round(window.innerHeight * 0.46), 24]
     : [88, 376, 88, 88];
 }

@@ -105,6 +105,8 @@ export async function planAgain(): Promise<void> {
 /** The plan that starts as soon as the robot knows its place; null: none waits. */
 export const waiting = signal<number | null>(null);
 
+/** With fewer the robot cannot find its place. */
+const LEAST_LANDMARKS = 2;
 /** Longer than this nobody waits who pressed a button. */
 const LONGEST_WAIT = 45_000;
 /** A robot that is silent for so many seconds does not start when it comes back. */
@@ -120,6 +122,12 @@ export async function start(): Promise<void> {
   if (!record) return;
   refusal.value = null;
   elsewhere.value = false;
+  const landmarks = site.value.landmarks.length;
+  if (landmarks < LEAST_LANDMARKS) {
+    // The robot would look for its place and never find it.
+    refusal.value = `The site has ${landmarks === 1 ? "one landmark" : "no landmark"}, and the robot needs at least two to know where it is. Place more under Draw.`;
+    return;
+  }
   if (snapshot.value && snapshot.value.site_id !== record.site_id) {
     if (!(await useSite(record.site_id))) return;
   } else if (snapshot.value?.state !== "fixing") {

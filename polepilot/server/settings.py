@@ -19,7 +19,6 @@ from pydantic import ValidationError, model_validator
 
 from polepilot.core.control.supervisor import Limits
 from polepilot.core.errors import ConfigError
-from polepilot.core.landmark import LandmarkKind
 from polepilot.core.link.calibration import DriveCalibration
 from polepilot.core.link.usb import PortAddress
 from polepilot.core.localization.localizer import LocalizerSettings as Localization
@@ -110,16 +109,6 @@ class Settings(Section):
                 max_range=self.proximity.max_range_m,
                 hard_limit=self.proximity.hard_limit_m,
             ),
-        )
-
-    @property
-    def landmark_kind(self) -> LandmarkKind:
-        """What a landmark looks like where the site does not say."""
-        return LandmarkKind(
-            bits=self.landmark.bits,
-            segment=self.landmark.segment_m,
-            diameter=self.landmark.diameter_m,
-            shape=self.landmark.shape,
         )
 
     @property

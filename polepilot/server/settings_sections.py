@@ -14,7 +14,6 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from polepilot.core.control.supervisor import Limits
 from polepilot.core.errors import ConfigError
-from polepilot.core.landmark import LandmarkKind
 from polepilot.core.link.calibration import DriveCalibration
 from polepilot.core.link.usb import PortAddress
 from polepilot.core.localization.localizer import LocalizerSettings as Localization
@@ -23,7 +22,7 @@ from polepilot.server.settings_errors import refusal
 
 _VEHICLE, _CAMERA, _PAN, _PROXIMITY = Vehicle(), Camera(), PanUnit(), Proximity()
 _LOCALIZER = Localization()
-_LANDMARK, _DRIVE, _LIMITS = LandmarkKind(), DriveCalibration(), Limits()
+_DRIVE, _LIMITS = DriveCalibration(), Limits()
 
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 Triple = Annotated[tuple[float, float, float], Field(strict=False)]
@@ -207,21 +206,8 @@ class VehicleSettings(Section):
 
 
 class LandmarkSettings(Section):
-    """What landmarks look like where a site does not say otherwise, and who reads them."""
+    """Who reads landmarks in pictures. What they look like is each site's own business."""
 
-    bits: Literal[4, 5, 6, 8] = Field(default=4, description="bits of the code: 4, 5, 6 or 8")
-    segment_m: float = Field(
-        default=_LANDMARK.segment, ge=0.002, le=10, description="length of one segment, metres"
-    )
-    diameter_m: float = Field(
-        default=_LANDMARK.diameter,
-        ge=0.002,
-        le=10,
-        description="thickness of a pole, or width of a flat sticker, metres",
-    )
-    shape: Literal["cylinder", "flat"] = Field(
-        default="cylinder", description='"cylinder" or "flat"'
-    )
     detector: Literal["default", "paper"] = Field(
         default="default", description='"default", or "paper" for the source paper\'s method'
     )

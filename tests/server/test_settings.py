@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from polepilot.core.control.supervisor import Limits
 from polepilot.core.errors import ConfigError
-from polepilot.core.landmark import LandmarkKind
 from polepilot.core.link.calibration import DriveCalibration
 from polepilot.core.link.usb import PortAddress
 from polepilot.core.localization.localizer import LocalizerSettings
@@ -36,7 +35,6 @@ def complaint(text: str) -> str:
 def test_no_file_is_the_simulated_robot() -> None:
     assert load_settings(None) == Settings()
     assert Settings().model == RobotModel()
-    assert Settings().landmark_kind == LandmarkKind()
     assert Settings().calibration == DriveCalibration()
     assert Settings().localization == LocalizerSettings()
     assert Settings().supervision == Limits()
@@ -59,8 +57,7 @@ def test_values_reach_the_core() -> None:
         wheelbase_m = 0.3
         max_speed_m_s = 0.5
         [landmark]
-        bits = 8
-        shape = "flat"
+        detector = "paper"
         [link]
         board = "serial"
         port = "0403:6001:A7"
@@ -85,7 +82,7 @@ def test_values_reach_the_core() -> None:
     assert model.pan.maximum == 2.0
     assert model.vehicle.wheelbase == 0.3
     assert model.vehicle.max_speed == 0.2
-    assert read.landmark_kind == LandmarkKind(bits=8, shape="flat")
+    assert read.landmark.detector == "paper"
     assert read.port_address == PortAddress(vendor=0x0403, product=0x6001, serial_number="A7")
     assert read.calibration.full_speed_right == 0.52
     assert read.calibration.counts_per_metre == 1200
@@ -100,7 +97,7 @@ def test_values_reach_the_core() -> None:
     [
         ("[camra]\n", "line 1: camra is not known: did you mean camera?"),
         ("[camera]\nwidht = 400\n", "line 2: camera.widht is not known: did you mean camera.width"),
-        ("[vehicle]\nsegment_m = 1\n", "vehicle.segment_m is not known: did you mean landmark.seg"),
+        ("[vehicle]\ndetector = 1\n", "vehicle.detector is not known: did you mean landmark.det"),
         ("[server]\nqqq = 1\n", "server.qqq is not known: the keys are port, data, panel."),
         ("\n[camera]\n\nwidth = 3", "line 4: camera.width is 3: expected a whole number from 32 "),
         ('[camera]\nwidth = "400"', 'camera.width is "400": expected a whole number from 32 to'),
@@ -121,7 +118,10 @@ def test_values_reach_the_core() -> None:
         ("pan = { minimum_rad = 3 }", "line 1: pan.minimum_rad is 3.0: expected less than"),
         ("pan.minimum_rad = 3", "line 1: pan.minimum_rad is 3.0: expected less than"),
         ("[pan]\nadc_at_maximum = 0", "pan.adc_at_maximum is 0: expected another number than"),
-        ("[landmark]\nbits = 7", "landmark.bits is 7: expected one of 4, 5, 6, 8."),
+        (
+            '[landmark]\ndetector = "x"',
+            'landmark.detector is "x": expected one of "default", "paper"',
+        ),
         ("[drive]\nservo_scale = 0", "drive.servo_scale is 0.0: expected another number than 0"),
         ("[drive]\nservo_center_rad = 1", "drive.servo_center_rad is 1.0: expected within servo_"),
         ("[localizer]\nlost_after_s = 1", "localizer.lost_after_s is 1.0: expected at least degr"),
@@ -269,7 +269,6 @@ def test_any_value_is_taken_or_refused_in_one_line(changes: dict[tuple[str, str]
     else:
         # What is taken can be used: nothing fails later in the core.
         assert read.model.vehicle.min_turn_radius > 0
-        assert read.landmark_kind.height > 0
         assert read.robot.model == read.model
 
 

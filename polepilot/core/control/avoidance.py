@@ -325,7 +325,7 @@ class ObstacleAvoidance:
                 self.reason = f"Passing an obstacle {where} on the {name}."
                 return True
         if not free[along > last].any():
-            self.reason = f"Waiting: the way ahead is occupied {where} up to its end."
+            self.reason = f"Waiting: the way ahead is occupied {where}."
         else:
             name = "on the left" if sides == [1] else "on either side"
             self.reason = f"Waiting: there is no room to pass the obstacle {where} {name}."

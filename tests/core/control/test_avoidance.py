@@ -124,7 +124,7 @@ def test_occupied_end_means_waiting() -> None:
     met = meet(LINE, ROOM, [Obstacle(7.0, 3.0)], longest=25)
     assert not met.done
     assert met.to_people >= 0.15
-    assert any("up to its end" in reason for reason in met.reasons)
+    assert any("is occupied" in reason for reason in met.reasons)
 
 
 @pytest.mark.parametrize("seed", range(3))

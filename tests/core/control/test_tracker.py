@@ -5,7 +5,15 @@ import math
 
 import numpy as np
 import pytest
-from core.control.driving import VEHICLE, arc, drive, plan_of, rounded_square
+from core.control.driving import (
+    FULL_SPEED,
+    VEHICLE,
+    actuation,
+    arc,
+    drive,
+    plan_of,
+    rounded_square,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -13,7 +21,8 @@ from polepilot.core.command import STAND
 from polepilot.core.control.stretches import cut
 from polepilot.core.control.tracker import PathTracker
 from polepilot.core.geometry import Pose2D
-from polepilot.core.sim.motion import Disturbances
+from polepilot.core.sim.motion import Disturbances, Motion
+from polepilot.core.vehicle import PanUnit
 
 TURN = VEHICLE.plan_turn_radius
 QUARTER = math.pi / 2
@@ -140,6 +149,67 @@ def test_resume_takes_the_path_up_in_the_middle() -> None:
     assert speeds[-1] < -0.05
     tracker.resume_at(99)
     assert tracker.progress == pytest.approx(3.0)
+
+
+def test_rejoined_against_the_direction_of_the_path_it_turns_round() -> None:
+    """A detour may end beside the pass that comes back; a turn takes more than OFF_ROUTE."""
+    plan = plan_of([(0.0, 0.0), (5.0, 0.0)])
+    tracker = PathTracker(plan, VEHICLE)
+    tracker.resume_at(1.0)
+    motion = Motion(
+        VEHICLE,
+        PanUnit(),
+        Disturbances(),
+        np.random.default_rng(1),
+        full_speed=FULL_SPEED,
+        pose=Pose2D(1.2, 0.1, math.pi),
+    )
+    turned = []
+    for _ in range(1200):
+        command = tracker.update(motion.pose, 0.05)
+        assert not tracker.off_route, tracker.off_route_reason
+        turned.append(tracker.aligned)
+        if tracker.done:
+            break
+        motion.advance(0.05, actuation(command))
+    assert tracker.done
+    assert not turned[0]
+    assert turned[-1]
+    assert motion.pose.distance_to((5.0, 0.0)) < 0.05
+
+
+def test_cut_short_goes_on_with_the_next_stretch() -> None:
+    tracker = PathTracker(plan_of([(0.0, 0.0), (1.0, 0.0), (0.4, 0.0)], [1, -1]), VEHICLE)
+    for place in np.arange(0.0, 0.95, 0.05):
+        tracker.update(Pose2D(float(place), 0, 0), 0.2)
+    assert not tracker.cut_short(0.05)
+    assert tracker.gear == 1
+    assert tracker.cut_short(0.12)
+    assert tracker.gear == -1
+    assert not tracker.cut_short(10.0), "backward nothing holds it"
+    speeds = [tracker.update(Pose2D(0.9, 0, 0), 0.05).speed for _ in range(40)]
+    assert speeds[-1] < -0.05
+    assert tracker.progress == pytest.approx(1.1, abs=0.02)
+
+
+def test_cut_short_at_the_end_is_done() -> None:
+    tracker = PathTracker(plan_of([(0.0, 0.0), (1.0, 0.0)]), VEHICLE)
+    for place in np.arange(0.0, 1.0, 0.05):
+        tracker.update(Pose2D(float(place), 0, 0), 0.2)
+    assert tracker.cut_short(0.08)
+    assert tracker.done
+    assert tracker.update(Pose2D(0.95, 0, 0), 0.05) == STAND
+    assert not tracker.cut_short(1.0)
+
+
+def test_taken_up_again_it_begins_from_standing() -> None:
+    tracker = PathTracker(plan_of([(0.0, 0.0), (3.0, 0.0)]), VEHICLE)
+    for _ in range(400):
+        tracker.update(Pose2D(0.5, 0.0, 0), 0.05)
+    assert tracker.off_route
+    tracker.take_up()
+    assert not tracker.off_route
+    assert tracker.update(Pose2D(0.5, 0.0, 0), 0.05).speed <= 0.1
 
 
 def test_done_stands() -> None:

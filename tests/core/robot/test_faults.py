@@ -15,6 +15,7 @@ from core.robot.rig import Rig, room
 from polepilot.core.errors import CameraError, RefusedError
 from polepilot.core.geometry import Pose2D
 from polepilot.core.observation import Detection
+from polepilot.core.planning.coverage import plan_scan
 from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.route import plan_route
 from polepilot.core.robot.ports import Sighting
@@ -343,3 +344,29 @@ def test_put_down_beside_its_path_it_does_not_drive_into_the_wall(tmp_path: Path
     rig.run(60, ended_or_paused)
     assert rig.world.contacts == 0
     assert rig.ended or rig.snapshot.reason
+
+
+def test_a_scan_waits_for_a_person_who_closes_a_dead_end(tmp_path: Path) -> None:
+    site = room(
+        boundary=[[0, 0], [5, 0], [5, 3], [0, 3]],
+        landmarks=[
+            {"id": number, "x": x, "y": y}
+            for number, x, y in ((1, 0, 1), (2, 2, 3), (4, 5, 2.4), (7, 3, 0), (8, 0, 2.2))
+        ],
+        walls=[[[3.4, 0], [3.4, 1.3]]],
+        start=[0.8, 0.6, 0.0],
+    )
+    rig = Rig(site, seed=2).ready()
+    person = Obstacle(4.2, 0.9, 0.22)
+    rig.world.add_obstacle(person)
+    rig.start(plan_scan(site, OPTIONS), tmp_path / "run.mcap")
+    assert rig.run(600, ended_or_paused, Guard(rig))
+    assert rig.snapshot.state is State.PAUSED
+    assert "Clear the way" in rig.snapshot.reason
+    rig.world.remove_obstacle(person)
+    rig.robot.resume()
+    assert rig.run(600, ended_or_paused, Guard(rig))
+    assert rig.ended, rig.snapshot.reason
+    assert rig.ended[0].outcome == "done"
+    assert rig.world.contacts == 0
+    assert rig.world.closest_obstacle >= 0.15

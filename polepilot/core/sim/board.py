@@ -1,13 +1,14 @@
 """The microcontroller, simulated: answers the bytes of the link as the firmware does.
 
-It keeps every rule of ``docs/protocol.md`` by itself, whatever the host says: two deadlines,
-the latched stop, ranges, slew limits, end stops of the pan motor, the stop before an obstacle.
-Time is an argument, seconds of the simulated world.
+It keeps every rule of ``docs/protocol.md`` by itself, whatever the host says: two deadlines, the
+latched stop, ranges, slew limits, end stops of the pan motor, the stop before an obstacle. Time
+is an argument, seconds of the simulated world.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
 
 from polepilot.core.errors import InternalError
@@ -163,8 +164,8 @@ class Board:
         self._settings = settings or BoardSettings()
         self._kind = kind
         self._firmware = firmware
-        self.executed: list[Arm | Pan | Estop | Clear] = []
-        """Acknowledged commands that were carried out, repetitions left out; for tests."""
+        self.executed: deque[Arm | Pan | Estop | Clear] = deque(maxlen=1000)
+        """The last acknowledged commands that were carried out, without repetitions; for tests."""
         self.power_up(now, reset)
 
     def power_up(self, now: float, reset: Faults = Faults.NONE) -> None:
@@ -327,10 +328,8 @@ class Board:
         settings, level = self._settings, self._inputs.battery_mv
         if Features.BATTERY not in settings.features:
             return
-        limit = settings.low_battery_mv
-        if self._low_battery:
-            limit += settings.battery_hysteresis_mv
-        self._low_battery = level < limit
+        more = settings.battery_hysteresis_mv if self._low_battery else 0
+        self._low_battery = level < settings.low_battery_mv + more
 
     # ---- packets -----------------------------------------------------------------------------
 

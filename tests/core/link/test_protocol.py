@@ -188,7 +188,7 @@ def test_a_lost_command_is_resent_with_its_number_and_carried_out_once(line: Lin
     numbers = [seq for _, seq in line.messages(Arm)]
     assert len(numbers) >= 3
     assert len(set(numbers)) == 1
-    assert line.board.executed == [Arm()]
+    assert list(line.board.executed) == [Arm()]
     assert line.link.state is LinkState.ARMED
     stamps = [at for at, _ in line.messages(Arm)]
     assert min(np.diff(stamps)) >= 0.06 - 1e-9
@@ -205,7 +205,7 @@ def test_a_command_that_nobody_answers_is_given_up(line: Line) -> None:
     line.to_board = clean
     line.run(0.5)
     assert line.link.state is LinkState.IDLE
-    assert line.board.executed == []
+    assert list(line.board.executed) == []
 
 
 def test_after_a_pause_of_the_owner_an_old_command_is_not_repeated(line: Line) -> None:

@@ -398,10 +398,8 @@ class Robot:
         self._verdict = self._supervisor.check(
             now, wanted, self._estimate, self._host.state, self._host.telemetry_age(now)
         )
-        duty = self.settings.calibration.to_drive(
-            self._verdict.command, self.settings.model.vehicle
-        )
-        self._host.drive(*duty)
+        command, vehicle = self._verdict.command, self.settings.model.vehicle
+        self._host.drive(*self.settings.calibration.to_drive(command, vehicle))
         latest = self._pan.latest
         rate = 0.0
         if self._gaze is not None:

@@ -90,8 +90,15 @@ export function pixelOf(at: Point): Point | null {
 export function mount(target: HTMLElement): () => void {
   map.setTarget(target);
   showAll();
+  let fitted = false;
   const stops = [
     effect(() => live.dim(stale.value && location.value.place !== "prove")),
+    effect(() => {
+      // The first site that there is to see: in Drive it comes before the one on the table.
+      if (fitted || !siteBounds(shownSite.value)) return;
+      fitted = true;
+      requestAnimationFrame(() => showAll());
+    }),
     effect(() => {
       void opened.value;
       requestAnimationFrame(() => showAll());

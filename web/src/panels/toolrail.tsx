@@ -2,8 +2,8 @@
 
 import type { Kind } from "../core/site";
 import { following, showAll, zoom } from "../map/view";
-import { canRedo, canUndo, dirty, redo, save, saved, saving, undo } from "../state/draft";
-import { sketch, take } from "../state/editor";
+import { canRedo, canUndo, dirty, redo, saved, saving, undo } from "../state/draft";
+import { saveDrawing, sketch, take, whole } from "../state/editor";
 import { location } from "../state/location";
 import { IconButton } from "../ui/controls";
 
@@ -56,8 +56,8 @@ function DrawTools() {
         icon="save"
         label="Save"
         hint="Save (Ctrl+S)"
-        disabled={saving.value || !(dirty.value || saved.value?.id === null)}
-        onClick={() => void save()}
+        disabled={saving.value || !(dirty.value || whole.value || saved.value?.id === null)}
+        onClick={saveDrawing}
       />
       <hr />
     </>

@@ -1,10 +1,10 @@
 /** The tool in hand and the drawing at hand. */
 
-import { effect, signal } from "@preact/signals";
+import { computed, effect, signal, untracked } from "@preact/signals";
 import type { Point } from "../core/geometry";
-import { added, type Kind, title } from "../core/site";
+import { added, fewest, type Kind, title } from "../core/site";
 import { beginSketch, finish, place, press, type Sketch, type Step } from "../core/sketch";
-import { change, select, site } from "./draft";
+import { change, save, select, site } from "./draft";
 import { location } from "./location";
 import { say } from "./notice";
 
@@ -18,7 +18,25 @@ const NEARBY_PIXELS = 3;
 const nearby = () => NEARBY_PIXELS * resolution.value;
 
 export function take(kind: Kind | null): void {
-  sketch.value = kind === null || sketch.value?.kind === kind ? null : beginSketch(kind);
+  const old = sketch.value?.kind;
+  keepSketch();
+  sketch.value = kind === null || old === kind ? null : beginSketch(kind);
+}
+
+/** Whether what is drawn so far is a whole thing already. */
+export const whole = computed(
+  () => sketch.value !== null && sketch.value.points.length >= fewest(sketch.value.kind),
+);
+
+/** Whoever goes on without Enter has not meant to lose what is drawn. */
+export function keepSketch(): void {
+  if (whole.value) finishSketch();
+}
+
+/** Saves the site with the drawing at hand. */
+export function saveDrawing(): void {
+  keepSketch();
+  void save();
 }
 
 export function moveTo(cursor: Point, snappedTo: string): void {
@@ -31,7 +49,8 @@ function apply(step: Step): void {
   if (!step.done || !kind) return;
   const result = added(site.value, kind, step.done);
   change(result.site);
-  select(result.selection);
+  // Finished by leaving: a selection would stand in the address of another place.
+  if (location.value.place === "draw") select(result.selection);
   say(`${title(result.site, result.selection)} is drawn.`);
   // A second boundary would replace the first: that tool is put away, as is the start's.
   if (kind === "boundary" || kind === "start") sketch.value = null;
@@ -55,6 +74,7 @@ export function pressKey(key: string): boolean {
 
 effect(() => {
   if (location.value.place !== "draw") {
+    untracked(keepSketch);
     sketch.value = null;
     pointer.value = null;
   }

@@ -1,8 +1,8 @@
 /** The keyboard. Shift+Space stops the robot, wherever the focus is. */
 
 import type { Kind } from "../core/site";
-import { redo, removeSelected, save, select, selection, undo } from "./draft";
-import { pressKey, sketch, take } from "./editor";
+import { redo, removeSelected, select, selection, undo } from "./draft";
+import { pressKey, saveDrawing, sketch, take } from "./editor";
 import { location } from "./location";
 import { stop } from "./robot";
 
@@ -32,7 +32,7 @@ function handle(event: KeyboardEvent): boolean {
   const command = event.ctrlKey || event.metaKey;
   const key = event.key.toLowerCase();
   if (command && key === "s") {
-    void save();
+    saveDrawing();
     return true;
   }
   if (inField(event.target)) return false;

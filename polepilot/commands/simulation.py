@@ -21,7 +21,7 @@ from polepilot.core.robot.mission import RunSummary
 from polepilot.core.robot.ports import SensorPort
 from polepilot.core.robot.recorder import Recorder
 from polepilot.core.robot.robot import Robot, RobotSettings
-from polepilot.core.robot.snapshot import Snapshot, State
+from polepilot.core.robot.snapshot import MissionStatus, Snapshot, State
 from polepilot.core.sim.motion import Disturbances
 from polepilot.core.sim.world import World
 from polepilot.core.site import Site, Start
@@ -127,6 +127,7 @@ class Simulation:
         self._recorder = recorder
         self._started = False
         self._idle_since: float | None = None
+        self._last: MissionStatus | None = None
         robot.on_run_ended = self._ended
         robot.load_site(site)
 
@@ -160,7 +161,7 @@ class Simulation:
         if rendered:
             sensor = Eye(world.camera, lambda kinds: LandmarkDetector(lens, kinds))
         robot = Robot(settings, sensor, world.link)
-        recorder = Recorder(log, witness=lambda: world.truth)
+        recorder = Recorder(log, witness=lambda: world.truth, patient=True)
         return cls(site, plan, world, robot, recorder)
 
     @property
@@ -173,6 +174,7 @@ class Simulation:
         self.now += TICK
         self.world.advance(self.now)
         snapshot = self.robot.step(self.now)
+        self._last = snapshot.mission or self._last
         self.tracks.add(snapshot, self.world.truth)
         if not self._started and snapshot.state is State.READY:
             self.robot.start(self._plan, 1, self._recorder)
@@ -218,15 +220,19 @@ class Simulation:
         self.summary = summary
 
     def _result(self, outcome: str, reason: str, wall: float) -> SimulationResult:
-        coverage = 0.0
         mission = self.robot.mission
         if mission is not None:
-            coverage = mission.status(self.now).coverage or 0.0
+            self._last = mission.status(self.now)
         self.robot.shutdown(self.now)
         if not self._started:
             self._recorder.close()
-        if mission is None and self.summary is not None:
-            coverage = self.summary.coverage or 0.0
+        coverage = 0.0
+        if self.summary is not None and self.summary.coverage is not None:
+            coverage = self.summary.coverage
+        elif self._last is not None:
+            # A route sweeps no area: its share that was driven stands in.
+            done = self.summary is not None and self.summary.outcome == "done"
+            coverage = 1.0 if done else self._last.progress
         tracks = self.tracks
         real = tracks.trajectory(tracks.stamps, tracks.real)
         estimated = tracks.trajectory(tracks.estimated_stamps, tracks.estimated)

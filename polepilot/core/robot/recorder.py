@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import base64
 import json
+import os
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from queue import SimpleQueue
@@ -25,7 +27,10 @@ from polepilot.core.robot.snapshot import Event, Snapshot
 from polepilot.core.site import Site
 
 CHUNK_BYTES = 32 * 1024
-"""A power cut loses at most the last chunk."""
+"""Small, so that little is lost with the last one."""
+SYNC_PERIOD = 2.0
+"""Seconds of robot time between two requests to put the log safely on the disk: a power cut loses
+no more than this and a chunk."""
 PICTURE_PERIOD = 1.0
 """Seconds between two recorded pictures."""
 
@@ -45,12 +50,16 @@ class Recorder:
         wall_start: float = 0.0,
         stamp_start: float = 0.0,
         witness: Callable[[], Pose2D] | None = None,
+        patient: bool = False,
     ) -> None:
         """Open ``path`` for a run that began at unix time ``wall_start``, robot time
         ``stamp_start``; robot stamps are kept in the messages' ``t``.
 
         ``witness`` tells the true pose, in simulation; the robot itself never sees it.
+        ``patient``: whoever writes may be kept waiting by a slow disk, and power is of no concern,
+        as in a simulation that runs faster than time; otherwise the log is given up first.
         """
+        self._patient = patient
         self._path = path
         self._witness = witness
         self._offset = wall_start - stamp_start
@@ -146,6 +155,8 @@ class Recorder:
             self._thread.join()
 
     def _put(self, channel: str, stamp: float, document: dict[str, Any]) -> None:
+        while self._patient and self.error is None and self._queue.qsize() > MOST_WAITING:
+            time.sleep(0.01)
         if self._queue.qsize() > MOST_WAITING:
             self.error = self.error or OSError("the disk does not keep up")
         if self.error is None:
@@ -158,12 +169,17 @@ class Recorder:
                 writer = Writer(file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
                 writer.start(profile="", library="polepilot")
                 channels: dict[str, int] = {}
+                synced = 0
                 while (message := self._queue.get()) is not None:
                     name, nanoseconds, data = message
                     if name not in channels:
                         schema = writer.register_schema(name, "jsonschema", b'{"type":"object"}')
                         channels[name] = writer.register_channel(name, "json", schema)
                     writer.add_message(channels[name], nanoseconds, data, nanoseconds)
+                    if not self._patient and nanoseconds - synced > SYNC_PERIOD * 1e9:
+                        synced = nanoseconds
+                        file.flush()
+                        os.fdatasync(file.fileno())
                 writer.finish()  # type: ignore[no-untyped-call]
         except Exception as error:  # noqa: BLE001 - the robot drives on, and says so
             self.error = error

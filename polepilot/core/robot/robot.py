@@ -236,9 +236,9 @@ class Robot:
     def shutdown(self, now: float) -> None:
         """Wheels still, log closed, ports closed. The last call."""
         self._now = now
+        # No ESTOP: that would be latched in the board until somebody released it after the next
+        # start. Disarmed, or no longer spoken to for 250 ms, its motors are off all the same.
         self._host.disarm()
-        self._host.pan(0)
-        self._host.estop()
         self._line.write(now)
         try:
             if self._mission is not None:

@@ -132,7 +132,7 @@ export interface paths {
         put?: never;
         /**
          * Add Plan
-         * @description Compute a plan and keep it.
+         * @description Compute a plan and keep it. It is given up when whoever asked for it leaves.
          */
         post: operations["add_plan"];
         delete?: never;

@@ -19,10 +19,3 @@ class DriveCommand:
 
 STAND = DriveCommand()
 """Wheels still, steering straight."""
-
-
-@dataclass(frozen=True, slots=True)
-class PanCommand:
-    """Rate of the pan motor as a share of its full duty, -1 to 1, left positive."""
-
-    rate: float = 0.0

@@ -9,7 +9,7 @@ from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from polepilot.core.robot.snapshot import State
+from polepilot.core.robot.snapshot import STAGES, State
 
 if TYPE_CHECKING:
     from polepilot.server.runner import Runner
@@ -57,6 +57,12 @@ class Metrics(Collector):
             loop.lateness_p99,
         )
         yield _gauge("polepilot_loop_busy_ratio", "Share of time that ticks take.", loop.busy)
+        stages = GaugeMetricFamily(
+            "polepilot_tick_stage_seconds", "Time of the last tick's stages.", labels=["stage"]
+        )
+        for stage, seconds in zip(STAGES, snapshot.durations, strict=True):
+            stages.add_metric([stage], seconds)
+        yield stages
         state = GaugeMetricFamily("polepilot_state", "1 for the present state.", labels=["state"])
         for name in State:
             state.add_metric([name.value], float(snapshot.state is name))

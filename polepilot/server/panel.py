@@ -81,11 +81,6 @@ class Panel:
         """The TCP port on 127.0.0.1; 0 before ``start`` and after ``stop``."""
         return 0 if self._server is None else int(self._server.get_port())
 
-    @property
-    def viewers(self) -> int:
-        """How many browsers look at the panel."""
-        return 0 if self._server is None else len(self._server.get_clients())
-
     def start(self) -> None:
         """Listen on a free port of 127.0.0.1. Starting twice does nothing."""
         with self._lock:

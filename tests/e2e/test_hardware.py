@@ -9,6 +9,7 @@ import threading
 import time
 import tty
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import cv2
@@ -62,10 +63,8 @@ class BoardOnAWire:
         straight_ahead = BoardInputs(pan_adc=512)
         while not self._stop.wait(0.005):
             now = time.monotonic() - began
-            try:
+            with suppress(BlockingIOError):
                 board.receive(os.read(self._master, 4096), now)
-            except BlockingIOError:
-                pass
             self.outputs = board.step(now, straight_ahead)
             if data := board.transmit():
                 os.write(self._master, data)

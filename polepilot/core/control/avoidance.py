@@ -314,18 +314,17 @@ class ObstacleAvoidance:
         places = places[free[places]]
         if self.blocked_for(now) <= PATIENCE:
             places = places[_onward(pose, points, places)]
-        x, y = obstacle.position
-        where = f"at {x:.1f}, {y:.1f}"
+        where = f"{max(0.0, pose.distance_to(obstacle.position)):.1f} m away"
         for side in sides:
             # The line from the obstacle to its other side is not to be crossed.
             barrier = (obstacle.position, wrap_angle(tangent - side * math.pi / 2))
             if self._to(pose, points, along, places, barrier):
                 self._side = side
                 name = "left" if side > 0 else "right"
-                self.reason = f"Passing an obstacle {where} on the {name}."
+                self.reason = f"Passing an obstacle on the {name}."
                 return True
         if not free[along > last].any():
-            self.reason = f"Waiting: the way ahead is occupied {where}."
+            self.reason = f"Waiting: the way ahead is occupied, {where}."
         else:
             name = "on the left" if sides == [1] else "on either side"
             self.reason = f"Waiting: there is no room to pass the obstacle {where} {name}."

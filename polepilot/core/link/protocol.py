@@ -411,7 +411,17 @@ class HostLink:
         state = self.state
         if state is not self._shown_state:
             self._shown_state = state
-            self._event(now, LinkEventCode.STATE, f"The board is {state.value}.")
+            self._event(now, LinkEventCode.STATE, _STATES[state])
+
+
+_STATES = {
+    LinkState.CLOSED: "The line to the board is closed.",
+    LinkState.CONNECTING: "Looking for the board.",
+    LinkState.IDLE: "The board is ready; its motors are off.",
+    LinkState.ARMED: "The board lets the motors run.",
+    LinkState.LINK_LOST: "The board missed us and has stopped the motors.",
+    LinkState.ESTOP: "The board is stopped until somebody releases it.",
+}
 
 
 def _clamp(value: int, limit: int) -> int:

@@ -131,10 +131,6 @@ class OdometryHistory:
     def __len__(self) -> int:
         return len(self._entries)
 
-    @property
-    def last_stamp(self) -> float | None:
-        return self._stamps[-1] if self._stamps else None
-
     def add(self, odometry: Odometry) -> None:
         """Append; one that is older than the newest, or not finite, is ignored."""
         stamp, speed, steering = odometry.stamp, odometry.speed, odometry.steering

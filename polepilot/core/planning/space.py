@@ -194,16 +194,6 @@ def free_space(site: Site, options: PlanOptions) -> FreeSpace:
     )
 
 
-@np.errstate(invalid="ignore", divide="ignore")  # GEOS sets these flags for nothing
-def reachable_area(site: Site, options: PlanOptions) -> MultiPolygon:
-    """The union of the clearance discs whose centres are connected to the start.
-
-    Raises:
-        PlanError: as ``free_space``.
-    """
-    return free_space(site, options).reachable()
-
-
 def free_poles(site: Site) -> list[geometry.Point]:
     """Axes of the landmarks that stand free on the floor; those at a wall belong to it."""
     round_ones = [mark for mark in site.landmarks if mark.kind.shape == "cylinder"]

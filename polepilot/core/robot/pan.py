@@ -1,4 +1,4 @@
-"""Bringing what was sensed at different moments onto one clock."""
+"""Where the camera points, and when: the recent angles, and the sweep."""
 
 from __future__ import annotations
 
@@ -6,36 +6,6 @@ from bisect import bisect_right
 from collections import deque
 
 from polepilot.core.observation import PanReading
-
-DRIFT = 200e-6
-"""How far a crystal of the microcontroller may run off, seconds per second."""
-MCU_WRAP = 2**32 / 1000
-"""The microcontroller's milliseconds start again after this many seconds."""
-
-
-class BoardClock:
-    """Robot time of what the microcontroller stamped with its own milliseconds.
-
-    A packet is received some time after it was stamped, never before, so the smallest
-    difference seen is the best estimate of the offset; it may creep up by the clocks' drift.
-    """
-
-    def __init__(self) -> None:
-        self._offset: float | None = None
-        self._last = 0.0
-
-    def to_robot(self, board_ms: int, received: float) -> float:
-        """The stamp in robot time; never later than ``received``."""
-        board = board_ms / 1000
-        offset = received - board
-        if (
-            self._offset is None or board < self._last or abs(offset - self._offset) > 1.0
-        ):  # first packet, wrap around, or a board that was reset
-            self._offset = offset
-        else:
-            self._offset = min(offset, self._offset + DRIFT * (board - self._last))
-        self._last = board
-        return min(board + self._offset, received)
 
 
 class PanTrack:

@@ -29,6 +29,8 @@ class State(StrEnum):
     """The pose is not known well enough to drive."""
 
 
+STAGES = ("sample", "estimate", "decide", "command", "publish")
+"""What one tick of the robot consists of."""
 Level = Literal["info", "warning", "fault"]
 
 
@@ -104,4 +106,4 @@ class Snapshot:
     events: tuple[Event, ...] = ()
     """The newest twenty, oldest first."""
     durations: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
-    """Seconds spent to sample, estimate, decide, command and publish, in the last tick."""
+    """Seconds that each of the ``STAGES`` took in this tick."""

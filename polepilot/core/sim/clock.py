@@ -1,4 +1,4 @@
-"""Two clocks for the simulated world: as fast as it can, or at the pace of the wall clock."""
+"""The simulated world's clock: at the pace of the wall clock, or a multiple of it."""
 
 from __future__ import annotations
 
@@ -11,19 +11,6 @@ from polepilot.core.sim.world import World
 LONGEST_LEAP = 0.10
 """Seconds of the world. A computer that stalls slows the simulated world down; otherwise every
 hiccup of a busy laptop would look to the simulated microcontroller like a lost computer."""
-
-
-class SimulatedClock:
-    """Waiting takes no time: the world goes on at once."""
-
-    def __init__(self, world: World) -> None:
-        self._world = world
-
-    def now(self) -> float:
-        return self._world.now
-
-    def wait_until(self, stamp: float) -> None:
-        self._world.advance(stamp)
 
 
 class PacedClock:

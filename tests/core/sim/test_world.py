@@ -11,7 +11,7 @@ from polepilot.core.geometry import Pose2D
 from polepilot.core.landmark import Landmark
 from polepilot.core.link.protocol import HostLink, LinkState
 from polepilot.core.scenery import Scenery
-from polepilot.core.sim.clock import PacedClock, SimulatedClock
+from polepilot.core.sim.clock import PacedClock
 from polepilot.core.sim.motion import Disturbances
 from polepilot.core.sim.obstacle import Obstacle
 from polepilot.core.sim.sensing import sightings
@@ -250,15 +250,6 @@ def test_start_without_one_is_on_the_floor() -> None:
     ring = ((1, 1), (3, 1), (3, 3), (1, 3))
     site = Site(boundary=((0, 0), (4, 0), (4, 4), (0, 4)), islands=(ring,))
     assert site.floor().contains(shapely.Point(start_of(site).position))
-
-
-def test_simulated_clock_takes_no_time() -> None:
-    world = quiet()
-    clock = SimulatedClock(world)
-    clock.wait_until(2.0)
-    assert clock.now() == pytest.approx(2.0)
-    clock.wait_until(1.0)
-    assert clock.now() == pytest.approx(2.0)
 
 
 class Wall:

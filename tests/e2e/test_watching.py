@@ -49,8 +49,10 @@ def test_watchers_do_not_slow_the_loop(browser: Browser, service: Service) -> No
     stuck.close()
     print(f"loop alone {alone}, watched {watched}, one gone {one_gone}")
     for loop in (alone, watched, one_gone):
-        # Fifty ticks a second; the machine may be busy with other tests.
-        assert loop["rate"] == pytest.approx(50, rel=0.1)
+        # Fifty ticks a second where nothing else runs; beside other tests and three browsers on
+        # the same two cores less, but nobody is waited for: that would be seconds.
+        assert loop["rate"] > 20
+        assert loop["lateness_p99"] < 0.5
 
 
 def test_a_phone_has_stop_and_no_sideways_scrolling(browser: Browser, service: Service) -> None:

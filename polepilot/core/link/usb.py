@@ -11,18 +11,19 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import serial
 from serial.tools import list_ports
 
 from polepilot.core.errors import ConfigError, LinkError
+from polepilot.core.link.listener import Listener
 from polepilot.core.link.report import Chunk
 
 _RETRY_PERIOD = 1.0
 """Between two attempts to open, seconds."""
 _MAX_UNSENT = 1024
 """Bytes that the device did not take. Beyond that it takes nothing: old commands are dropped."""
-_READ_SIZE = 4096
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +107,7 @@ class SerialPort:
         self._baud_rate = baud_rate
         self._clock = clock
         self._device: serial.Serial | None = None
+        self._listener: Listener | None = None
         self._next_attempt = -float("inf")
         self._told: str | None = None
         """The complaint that the owner already knows."""
@@ -122,24 +124,16 @@ class SerialPort:
     def read(self) -> list[Chunk]:
         """What has come since the last call, perhaps nothing; never blocks.
 
-        The stamp is the time of reading: `HostLink` finds the regular time of the board in it.
-
         Raises:
             LinkError: the device is missing, busy, forbidden or was unplugged. Raised once for
                 each reason; after that the port is quietly looked for again.
         """
-        descriptor = self._descriptor()
-        if descriptor is None:
+        if self._descriptor() is None or self._listener is None:
             return []
-        try:
-            data = os.read(descriptor, _READ_SIZE)
-        except BlockingIOError:
-            return []
-        except OSError as error:
-            raise self._gone(error) from error
-        if not data and not self._alive():
-            raise self._gone(None)
-        return [Chunk(self._clock(), data)] if data else []
+        chunks, failure = self._listener.take(), self._listener.failure
+        if not chunks and failure is not None:
+            raise self._gone(failure) from failure
+        return chunks
 
     def write(self, data: bytes) -> None:
         """Send ``data``; never blocks. What the device does not take now is sent later.
@@ -170,7 +164,10 @@ class SerialPort:
     def close(self) -> None:
         """Give the device back. A later read would open it again."""
         device, self._device = self._device, None
+        listener, self._listener = self._listener, None
         self._unsent.clear()
+        if listener is not None:
+            listener.stop()
         if device is not None:
             with contextlib.suppress(OSError, serial.SerialException):
                 device.close()
@@ -197,6 +194,9 @@ class SerialPort:
         except (OSError, serial.SerialException, ValueError) as error:
             self._complain(*_explain(path, error))
             return
+        self._listener = Listener(
+            int(self._device.fileno()), self._clock, partial(_alive, self._device)
+        )
         self._told = None
         self.generation += 1
 
@@ -206,21 +206,22 @@ class SerialPort:
         self._told = message
         raise LinkError(message, remedy=remedy)
 
-    def _alive(self) -> bool:
-        """Whether reading nothing means that nothing came, and not that the device left."""
-        assert self._device is not None
-        try:
-            return int(self._device.in_waiting) >= 0
-        except OSError:
-            return False
-
-    def _gone(self, error: OSError | None) -> LinkError:
+    def _gone(self, error: OSError) -> LinkError:
         self.close()
         self._next_attempt = self._clock() + _RETRY_PERIOD
-        reason = "" if error is None else f" ({error.strerror})"
-        message = f"The serial device {self._address} was unplugged or has failed{reason}."
+        message = (
+            f"The serial device {self._address} was unplugged or has failed ({error.strerror})."
+        )
         self._told = None
         return LinkError(message, remedy="Plug it in again; it is looked for once a second.")
+
+
+def _alive(device: serial.Serial) -> bool:
+    """Whether reading nothing means that nothing came, and not that the device left."""
+    try:
+        return int(device.in_waiting) >= 0
+    except OSError:
+        return False
 
 
 def _explain(path: str, error: Exception) -> tuple[str, str]:

@@ -73,6 +73,14 @@ def read_until(port: SerialPort, wanted: bytes) -> bytes:
     return data
 
 
+def read_for(port: SerialPort, seconds: float) -> None:
+    """Somebody who reads in every tick: what happens to the device is noticed by then."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        port.read()
+        time.sleep(0.005)
+
+
 def test_bytes_pass_both_ways_unchanged(plug: Plug) -> None:
     port = SerialPort(PortAddress(path=str(plug.path)))
     everything = bytes(range(256))
@@ -121,7 +129,7 @@ def test_unplugging_raises_once_and_plugging_in_opens_again(plug: Plug) -> None:
     port.read()
     plug.remove()
     with pytest.raises(LinkError, match="unplugged"):
-        port.read()
+        read_for(port, 2.0)
     assert not port.is_open
     assert port.read() == []
     plug.insert()
@@ -271,3 +279,18 @@ def test_a_board_on_a_real_port_is_connected_armed_stopped_and_replugged(plug: P
     finally:
         board.stop()
         port.close()
+
+
+def test_bytes_are_stamped_when_they_come_not_when_they_are_read(plug: Plug) -> None:
+    port = SerialPort(PortAddress(path=str(plug.path)))
+    port.read()
+    sent = []
+    for byte in b"abc":
+        sent.append(time.monotonic())
+        os.write(plug.master, bytes([byte]))
+        time.sleep(0.1)
+    chunks = port.read()
+    assert [chunk.data for chunk in chunks] == [b"a", b"b", b"c"]
+    for chunk, moment in zip(chunks, sent, strict=True):
+        assert 0 <= chunk.stamp - moment < 0.09
+    port.close()

@@ -219,12 +219,12 @@ def _path(
     notes: list[str],
 ) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
     if options.min_turn_radius <= 0:
-        return _plain_path(runs, space, options)
+        return _plain_path(runs, space, options, notes)
     return _driven_path(runs, space, options, target, notes)
 
 
 def _plain_path(
-    runs: list[Run], space: FreeSpace, options: PlanOptions
+    runs: list[Run], space: FreeSpace, options: PlanOptions, notes: list[str]
 ) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
     """Corners as sharp as they come, all forward."""
     blocks: list[Points] = [np.array([space.start.position])]
@@ -236,6 +236,8 @@ def _plain_path(
         if math.dist(here, there) > 1e-6:
             way = space.shortest_path(here, there)
             if way is None:
+                x, y = there
+                notes.append(f"no way was found to a pass at ({x:.2f}, {y:.2f}); it is left out.")
                 continue
             blocks.append(np.array(way[1:]))
             count += len(way) - 1

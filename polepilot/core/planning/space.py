@@ -51,6 +51,9 @@ class FreeSpace:
         init=False, default_factory=dict
     )
 
+    _exact: bool = field(init=False, default=False)
+    """The corners are those of ``polygon`` itself."""
+
     def __post_init__(self) -> None:
         self._loose = self.polygon.buffer(SLACK, join_style="mitre")
         shapely.prepare(self._loose)
@@ -88,6 +91,18 @@ class FreeSpace:
         """
         if self.holds(LineString([a, b])):
             return [a, b]
+        way = self._search(a, b)
+        if way is None and not self._exact:
+            # The corners are taken a little inside, which closes the narrowest necks.
+            self._exact = True
+            corners = [corner for part in polygons(self.polygon) for corner in _reflex(part)]
+            self._nodes = np.array(corners, dtype=float).reshape(-1, 2)
+            self._seen.clear()
+            way = self._search(a, b)
+        return way
+
+    def _search(self, a: geometry.Point, b: geometry.Point) -> list[geometry.Point] | None:
+        """A* from ``a`` to ``b`` over the corners."""
         nodes = self._bends()
         count = len(nodes)
         points = np.vstack([nodes, [a], [b]])

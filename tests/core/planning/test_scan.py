@@ -74,6 +74,13 @@ def test_a_way_back_that_fails_half_way() -> None:
     check(plan_scan(site, PlanOptions(min_turn_radius=0.6)), site, 0.6)
 
 
+def test_what_lies_behind_a_neck_of_two_millimetres_is_swept() -> None:
+    site = maps.random_site(np.random.default_rng(5778))
+    plan = plan_scan(site, PlanOptions(min_turn_radius=0.0))
+    check(plan, site, 0.0)
+    assert judge.coverage(plan, site) >= 0.97
+
+
 @settings(deadline=None, max_examples=12)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.36, 0.6]))
 def test_random_maps(seed: int, radius: float) -> None:

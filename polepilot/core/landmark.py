@@ -8,7 +8,10 @@ says the opposite contradicts its own figure and example.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cache
+from itertools import combinations
 from typing import Literal
 
 from polepilot.core.errors import InputError
@@ -16,6 +19,13 @@ from polepilot.core.geometry import Point
 
 SUPPORTED_BITS = (4, 5, 6, 8)
 Shape = Literal["cylinder", "flat"]
+LARGEST_SPACING = 4
+"""`id_set` knows sets of ids that differ in up to this many segments."""
+_TWENTY_WORDS = (
+    *(5, 8, 22, 34, 47, 57, 78, 91, 97, 119),
+    *(124, 139, 157, 164, 179, 190, 199, 234, 237, 240),
+)
+"""Words of eight bits that differ in at least three: twenty is the most there are."""
 
 
 def encode(landmark_id: int, bits: int = 4) -> str:
@@ -45,6 +55,52 @@ def decode(code: str) -> int | None:
     if code[:2] != "11" or code[-2:] != "11" or "1" in middle[::2]:
         return None
     return int(middle[1::2][::-1], 2) or None
+
+
+def spacing(ids: Iterable[int], bits: int = 4) -> int:
+    """In how many segments the codes of two of these ids differ at the least.
+
+    With 1, a single segment that is hidden, dirty or glaring turns one landmark into another; with
+    2 it gives a code that stands nowhere; with 3 two such segments are noticed. A single id is as
+    far from others as can be: ``bits``.
+
+    Raises:
+        InputError: an id does not fit into ``bits``, or ``bits`` is not supported.
+    """
+    chosen = sorted(set(ids))
+    for number in chosen:
+        encode(number, bits)
+    # Fences and ends are the same in all codes: they differ where the bits of the ids do.
+    return min(((a ^ b).bit_count() for a, b in combinations(chosen, 2)), default=bits)
+
+
+@cache
+def id_set(bits: int, distance: int = 2) -> tuple[int, ...]:
+    """A largest set of ids whose codes differ from each other in at least ``distance`` segments.
+
+    Distance 2: the ids with an odd number of bright bits (a parity bit that leaves out id 0).
+    Distances 3 and 4: greedy codes, which are as large as any for 4 to 6 bits and at distance 4;
+    for 8 bits at distance 3 greed finds 16 words of 20, so those are listed. Each is moved (one
+    word added to all) to where id 0 is not in it and most bits are bright: they make more edges.
+
+    Raises:
+        InputError: ``bits`` is not supported, or ``distance`` is not 1 to 4.
+    """
+    _check_bits(bits)
+    if not 1 <= distance <= LARGEST_SPACING:
+        raise InputError(f"distance is {distance}: expected 1 to {LARGEST_SPACING} segments.")
+    everything = range(2**bits)
+    if distance == 1:
+        return tuple(everything[1:])
+    if distance == 2:
+        return tuple(number for number in everything if number.bit_count() % 2)
+    words: list[int] = list(_TWENTY_WORDS) if (bits, distance) == (8, 3) else []
+    for word in everything:
+        if all((word ^ other).bit_count() >= distance for other in words):
+            words.append(word)
+    moved = (sorted(word ^ step for word in words) for step in everything)
+    usable = (chosen for chosen in moved if chosen[0] != 0)
+    return tuple(max(usable, key=lambda chosen: sum(word.bit_count() for word in chosen)))
 
 
 @dataclass(frozen=True, slots=True)

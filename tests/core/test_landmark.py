@@ -5,7 +5,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from polepilot.core.errors import InputError
-from polepilot.core.landmark import SUPPORTED_BITS, Landmark, LandmarkKind, decode, encode
+from polepilot.core.landmark import (
+    SUPPORTED_BITS,
+    Landmark,
+    LandmarkKind,
+    decode,
+    encode,
+    id_set,
+    spacing,
+)
 
 GOLDEN = "1101000101011"
 
@@ -66,3 +74,66 @@ def test_sizes() -> None:
 def test_impossible_kinds_are_refused(bad: dict[str, float]) -> None:
     with pytest.raises(InputError, match="expected"):
         LandmarkKind(**bad)  # type: ignore[arg-type]
+
+
+LARGEST = {
+    **{(bits, 1): 2**bits - 1 for bits in SUPPORTED_BITS},
+    **{(bits, 2): 2 ** (bits - 1) for bits in SUPPORTED_BITS},
+    **{(4, 3): 2, (5, 3): 4, (6, 3): 8, (8, 3): 20},
+    **{(4, 4): 2, (5, 4): 2, (6, 4): 4, (8, 4): 16},
+}
+"""How many words of so many bits can differ in so many places: the tables of coding theory."""
+
+
+@pytest.mark.parametrize(("bits", "distance"), LARGEST)
+def test_id_sets_are_as_large_as_can_be(bits: int, distance: int) -> None:
+    chosen = id_set(bits, distance)
+    assert len(chosen) == LARGEST[bits, distance]
+    assert list(chosen) == sorted(set(chosen))
+    assert 0 not in chosen
+    codes = [encode(number, bits) for number in chosen]
+    for i, one in enumerate(codes):
+        for other in codes[:i]:
+            assert sum(a != b for a, b in zip(one, other, strict=True)) >= distance
+    assert spacing(chosen, bits) >= distance
+
+
+@settings(deadline=None)
+@given(
+    st.sampled_from(SUPPORTED_BITS).flatmap(
+        lambda bits: st.tuples(st.just(bits), st.sets(st.integers(1, 2**bits - 1), min_size=2))
+    )
+)
+def test_spacing_is_that_of_the_codes(case: tuple[int, set[int]]) -> None:
+    bits, ids = case
+    codes = [encode(number, bits) for number in ids]
+    nearest = min(
+        sum(a != b for a, b in zip(one, other, strict=True))
+        for i, one in enumerate(codes)
+        for other in codes[:i]
+    )
+    assert spacing(ids, bits) == nearest
+
+
+@pytest.mark.parametrize(("bits", "distance"), [(5, 2), (6, 3), (8, 3), (8, 4)])
+def test_misread_segments_are_noticed(bits: int, distance: int) -> None:
+    """Fewer wrong segments than the distance never turn one landmark of the set into another."""
+    chosen = set(id_set(bits, distance))
+    for number in chosen:
+        for wrong in range(1, 2**bits):
+            if wrong.bit_count() < distance:
+                assert number ^ wrong not in chosen
+
+
+def test_spacing_of_small_sets() -> None:
+    assert spacing(range(1, 16)) == 1
+    assert spacing([13]) == 4
+    assert spacing([7, 7, 7], 5) == 5
+    with pytest.raises(InputError, match="expected 1 to 15"):
+        spacing([3, 16])
+
+
+@pytest.mark.parametrize(("bits", "distance"), [(5, 0), (5, 5), (7, 2), (3, 1)])
+def test_impossible_id_sets_are_refused(bits: int, distance: int) -> None:
+    with pytest.raises(InputError, match="expected"):
+        id_set(bits, distance)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from polepilot.core.errors import ConfigError
 from polepilot.core.geometry import Pose2D
 
 
@@ -62,6 +63,15 @@ class Camera:
     """Of the lens above the floor."""
     rate: float = 15.0
     """Frames per second asked for."""
+    distortion: tuple[float, ...] = ()
+    """Of the lens: k1, k2, p1, p2, k3 in OpenCV's order (`core/vision/lens.py`); empty is ideal."""
+
+    def __post_init__(self) -> None:
+        if len(self.distortion) not in (0, 5):
+            raise ConfigError(
+                f"camera: distortion has {len(self.distortion)} numbers: expected k1, k2, p1, p2, "
+                "k3, or none."
+            )
 
     @property
     def half_view(self) -> float:

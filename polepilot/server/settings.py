@@ -94,6 +94,7 @@ class Settings(Section):
                 forward=self.camera.forward_m,
                 mount_height=self.camera.height_m,
                 rate=self.camera.rate_hz,
+                distortion=self._distortion,
             ),
             pan=PanUnit(
                 minimum=self.pan.minimum_rad,
@@ -110,6 +111,12 @@ class Settings(Section):
                 hard_limit=self.proximity.hard_limit_m,
             ),
         )
+
+    @property
+    def _distortion(self) -> tuple[float, ...]:
+        """Nothing where the lens is ideal; the simulated one always is."""
+        real = self.camera.source != "simulated"
+        return self.camera.distortion if real and any(self.camera.distortion) else ()
 
     @property
     def calibration(self) -> DriveCalibration:

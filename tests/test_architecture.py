@@ -19,6 +19,7 @@ ALLOWED: dict[str, set[str]] = {
     "core.planning": {NOUNS, "core.planning"},
     "core.control": {NOUNS, "core.control"},
     "core.link": {NOUNS, "core.link"},
+    "core.printing": {NOUNS, "core.printing"},
     "core.robot": {
         NOUNS,
         "core.vision",

@@ -103,6 +103,26 @@ def id_set(bits: int, distance: int = 2) -> tuple[int, ...]:
     return tuple(max(usable, key=lambda chosen: sum(word.bit_count() for word in chosen)))
 
 
+def recommended_ids(bits: int, count: int | None = None) -> tuple[int, ...]:
+    """The ids to use: with distance 2, or, where ``count`` is known, with the largest there is.
+
+    Raises:
+        InputError: ``bits`` is not supported, or has no ``count`` ids with distance 2.
+    """
+    largest = id_set(bits)
+    if count is None:
+        return largest
+    if not 1 <= count <= len(largest):
+        more = next((n for n in SUPPORTED_BITS if len(id_set(n)) >= count), None)
+        hint = f", or {more} bits" if more and count > 0 else ""
+        raise InputError(
+            f"count is {count}: {bits} bits have {len(largest)} ids that differ in 2 segments;"
+            f" expected 1 to {len(largest)}{hint}."
+        )
+    far = (id_set(bits, distance) for distance in range(LARGEST_SPACING, 1, -1))
+    return next(chosen[:count] for chosen in far if len(chosen) >= count)
+
+
 @dataclass(frozen=True, slots=True)
 class LandmarkKind:
     """What the landmarks of a site look like; lengths in metres."""

@@ -11,7 +11,8 @@ import cv2
 import pytest
 from vision_scenes import picture, pole
 
-from polepilot.commands.detect import parse_center, parse_ids
+from polepilot.commands.detect import parse_center
+from polepilot.commands.ids import parse_ids
 from polepilot.commands.main import run
 from polepilot.core.errors import InputError
 from polepilot.core.landmark import LandmarkKind

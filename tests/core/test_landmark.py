@@ -12,6 +12,7 @@ from polepilot.core.landmark import (
     decode,
     encode,
     id_set,
+    recommended_ids,
     spacing,
 )
 
@@ -137,3 +138,27 @@ def test_spacing_of_small_sets() -> None:
 def test_impossible_id_sets_are_refused(bits: int, distance: int) -> None:
     with pytest.raises(InputError, match="expected"):
         id_set(bits, distance)
+
+
+@pytest.mark.parametrize("bits", SUPPORTED_BITS)
+def test_the_fewer_ids_the_farther_apart(bits: int) -> None:
+    assert recommended_ids(bits) == id_set(bits, 2)
+    before = 5
+    for count in range(1, 2 ** (bits - 1) + 1):
+        chosen = recommended_ids(bits, count)
+        assert len(set(chosen)) == count
+        now = min(spacing(chosen, bits), 4)
+        assert now >= max(d for d in (2, 3, 4) if LARGEST[bits, d] >= count)
+        assert 2 <= now <= before
+        before = now
+
+
+@pytest.mark.parametrize(("bits", "count"), [(4, 9), (5, 0), (8, 129), (5, -1)])
+def test_more_ids_than_there_are_far_apart(bits: int, count: int) -> None:
+    with pytest.raises(InputError, match=r"count is -?\d+: .*expected 1 to"):
+        recommended_ids(bits, count)
+
+
+def test_more_bits_are_proposed() -> None:
+    with pytest.raises(InputError, match="or 6 bits"):
+        recommended_ids(5, 20)

@@ -1,0 +1,262 @@
+"""What is drawn on a sheet: tiles of landmarks with their marks, the ruler, the heading.
+
+Nothing but the colour of the code is drawn within the code. Lines lie just outside of what they
+bound. White paper above and below the code carries what a person needs: which way is up, which
+landmark it is, what is glued where.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from polepilot.core.landmark import encode
+from polepilot.core.printing.drawing import (
+    BLACK,
+    GREY,
+    PALE,
+    Box,
+    Ink,
+    Item,
+    Role,
+    Shape,
+    Stroke,
+    Text,
+)
+from polepilot.core.printing.fonts import text_width
+from polepilot.core.printing.tiles import (
+    FOOT,
+    GUTTER,
+    HEADER,
+    MARGIN,
+    RULER_STRIP,
+    Placed,
+    Tile,
+)
+
+RULER = 100.0
+"""Length of the ruler on every sheet, mm."""
+
+_LINE = 0.15
+_BLEED = 4.0
+"""How far the colours go on into the flap, so that a tube a little too thick shows no white."""
+_SMALL = 2.3
+_NARROW = 42.0
+"""On narrower tiles, arrow and number stand one above the other."""
+
+
+def tile_items(placed: Placed, inks: tuple[Ink, Ink]) -> Iterator[Item]:
+    """A tile with everything around it; ``inks`` are the dark and the bright colour (0 and 1)."""
+    for item in _tile_items(placed, inks):
+        if not isinstance(item, Text) or item.words:  # where there is no room, there are no words
+            yield item
+
+
+def _tile_items(placed: Placed, inks: tuple[Ink, Ink]) -> Iterator[Item]:
+    yield from _colours(placed, inks)
+    yield from _outline(placed)
+    yield from _seam_marks(placed)
+    tile, x, y = placed.tile, placed.x, placed.y
+    yield from _collar(placed) if tile.first_row else _glue_strip(placed)
+    bottom = y + tile.height
+    if tile.last_row:
+        choices = [f"landmark {tile.landmark} · bottom", "bottom"]
+        words = _fitting(choices, tile.width)
+        yield Text(x + tile.width / 2, bottom + 4.6, words, _SMALL, "middle", ink=GREY)
+    else:
+        below = f"part {tile.number + tile.columns}"
+        choices = [
+            f"cut here: this edge goes onto {below}, where its colours begin",
+            f"cut here, glue onto {below}",
+            "cut here",
+        ]
+        words = _fitting(choices, tile.width - 4, 2.2)
+        yield Text(x + tile.width / 2, bottom + 3.0, words, 2.2, "middle", ink=GREY)
+
+
+def sheet_items(width: float, height: float, heading: Sequence[str], page: str) -> Iterator[Item]:
+    """The heading (the longest choice that fits), the sheet's number, and the ruler."""
+    base = MARGIN + HEADER - 2.2
+    room = width - 2 * MARGIN - text_width(page, _SMALL, bold=True) - 6
+    yield Text(MARGIN, base, _fitting(heading, room), _SMALL, ink=GREY)
+    yield Text(width - MARGIN, base, page, _SMALL, "end", bold=True)
+    yield from _ruler(MARGIN + RULER_STRIP - 4.0, height - MARGIN - 2.0)
+
+
+def arrow_up(x: float, y: float, size: float, ink: Ink = BLACK) -> Shape:
+    """An arrow of this height standing on (x, y)."""
+    half, neck = size * 0.36, size * 0.13
+    head = y - size * 0.55
+    return Shape(
+        (
+            *((x, y - size), (x + half, head), (x + neck, head), (x + neck, y)),
+            *((x - neck, y), (x - neck, head), (x - half, head)),
+        ),
+        ink,
+    )
+
+
+def joint_letter(row: int) -> str:
+    """How the seam below this row is called: A to Z, then A1 to Z1 and so on."""
+    turn, letter = divmod(row, 26)
+    return chr(ord("A") + letter) + (str(turn) if turn else "")
+
+
+def ids_in_words(ids: Sequence[int], dash: str = "–") -> str:
+    """``[1, 2, 3, 7]`` as "1–3, 7"."""
+    runs: list[list[int]] = []
+    for number in sorted(ids):
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    words = []
+    for run in runs:
+        if len(run) > 2:
+            words.append(f"{run[0]}{dash}{run[-1]}")
+        else:
+            words += map(str, run)
+    return ", ".join(words)
+
+
+def _colours(placed: Placed, inks: tuple[Ink, Ink]) -> Iterator[Item]:
+    tile, surface = placed.tile, placed.tile.surface
+    bits = (surface.segments - 5) // 2
+    code = encode(tile.landmark, bits)
+    bleed = min(_BLEED, tile.flap / 2)
+    first = math.floor(tile.top / surface.segment + 1e-9)
+    last = math.ceil((tile.top + tile.height) / surface.segment - 1e-9)
+    for index in range(first, last):
+        top = max(index * surface.segment, tile.top)
+        bottom = min((index + 1) * surface.segment, tile.top + tile.height)
+        ink, y = inks[int(code[index])], placed.y + top - tile.top
+        yield Box(placed.x, y, tile.width, bottom - top, ink, "code")
+        if bleed:
+            yield Box(placed.x + tile.width, y, bleed, bottom - top, ink, "bleed")
+
+
+def _outline(placed: Placed) -> Iterator[Item]:
+    """Where to cut (solid), just outside of the code; where colours begin at a seam (dashed)."""
+    tile, half = placed.tile, _LINE / 2
+    left, right = placed.x - half, placed.x + tile.width + tile.flap + half
+    top = placed.y - tile.above
+    end = placed.y + tile.height
+    bottom = end + FOOT if tile.last_row else end + half
+    yield _line((left, top), (left, bottom))
+    yield _line((right, top), (right, bottom))
+    yield _line((left, top), (right, top))
+    reach = GUTTER - 1.0
+    yield _line((left, bottom), (right, bottom))
+    if not tile.last_row:
+        yield _line((left - reach, bottom), (left, bottom))
+        yield _line((right, bottom), (right + reach, bottom))
+    if not tile.first_row:
+        edge = placed.y
+        yield _line((left - reach, edge), (left - 0.5, edge), dash=0.8)
+        yield _line((right + 0.5, edge), (right + reach, edge), dash=0.8)
+
+
+def _line(a: tuple[float, float], b: tuple[float, float], dash: float = 0.0) -> Stroke:
+    return Stroke((a, b), GREY, _LINE, dash)
+
+
+def _seam_marks(placed: Placed) -> Iterator[Item]:
+    """Half diamonds that become whole where two rows meet; arrows where the flap begins."""
+    tile, y, end = placed.tile, placed.y, placed.y + placed.tile.height
+    outer = placed.x + tile.width + tile.flap
+    places = []
+    if tile.column == 0:
+        places.append(placed.x - GUTTER / 2)
+    if tile.last_column:
+        places.append(outer + GUTTER / 2)
+    for x in places:
+        if not tile.last_row:
+            yield Shape(((x - 2, end), (x + 2, end), (x, end - 2.6)))
+            yield Text(x, end - 3.4, joint_letter(tile.row), 2.6, "middle", bold=True)
+        if not tile.first_row:
+            yield Shape(((x - 2, y), (x + 2, y), (x, y + 2.6)))
+            yield Text(x, y + 5.4, joint_letter(tile.row - 1), 2.6, "middle", bold=True)
+    if not tile.flap:
+        return
+    edge = placed.x + tile.width
+    yield Shape(((edge - 1.1, y - 2.6), (edge + 1.1, y - 2.6), (edge, y - 0.4)), GREY)
+    yield Shape(((edge - 1.1, end + 2.6), (edge + 1.1, end + 2.6), (edge, end + 0.4)), GREY)
+    bleed = min(_BLEED, tile.flap / 2)
+    white = tile.flap - bleed
+    choices = ["glue: the left edge comes onto this flap, up to the arrows", "glue flap", "glue"]
+    if not tile.last_column:
+        choices[0] = f"glue: part {tile.number + 1} comes onto this flap, up to the arrows"
+    size = min(_SMALL, white * 0.6)
+    words = _fitting(choices, tile.height - 2, size)
+    x = edge + bleed + white / 2 + size * 0.35
+    yield Text(x, y + tile.height / 2, words, size, "middle", angle=90, ink=GREY)
+
+
+def _collar(placed: Placed) -> Iterator[Item]:
+    """Above the first row: which way is up, and the landmark's number in large figures."""
+    tile, x, y = placed.tile, placed.x, placed.y
+    number = str(tile.landmark)
+    if tile.width < _NARROW:
+        size = min(6.0, 0.9 * tile.width / text_width(number, 1.0, bold=True))
+        middle = x + tile.width / 2
+        yield Text(middle, y - 7.0, number, size, "middle", bold=True)
+        yield arrow_up(middle, y - 1.5, min(5.0, 1.3 * tile.width))
+        words = f"TOP · landmark {number}"
+        yield Text(x + tile.width + tile.flap + 1.5, y - 4.0, words, _SMALL, ink=GREY)
+        return
+    base = y - 3.5
+    yield arrow_up(x + 4.2, base, 7.5)
+    yield Text(x + 8.5, base, "TOP", 4.2, bold=True)
+    start = x + 10.5 + text_width("TOP", 4.2, bold=True)
+    end = x + tile.width - 2.0
+    yield Text(end, base, number, 9.0, "end", bold=True)
+    end -= text_width(number, 9.0, bold=True) + 2.0
+    part = f" · part {tile.number} of {tile.parts}" if tile.parts > 1 else ""
+    bits = (tile.surface.segments - 5) // 2
+    short = f"part {tile.number}/{tile.parts}" if tile.parts > 1 else ""
+    choices = [f"landmark {number} · {bits} bits{part}", f"landmark {number}{part}", short]
+    words = _fitting(choices, end - start)
+    yield Text((start + end) / 2, base, words, _SMALL, "middle", ink=GREY)
+
+
+def _glue_strip(placed: Placed) -> Iterator[Item]:
+    """Above every other row: what it is, and what is glued onto it."""
+    tile, x, y = placed.tile, placed.x, placed.y
+    above, name = f"part {tile.number - tile.columns}", _name(tile)
+    choices = [
+        f"{name} · glue: {above} comes onto this strip, up to where the colours begin",
+        f"{name} · glue: {above} comes onto this strip",
+        f"{name} · glue under {above}",
+        name,
+        f"{tile.landmark}: {tile.number}/{tile.parts}",
+    ]
+    base = y - tile.above / 2 + 0.35 * _SMALL
+    arrow = min(5.0, tile.above - 1.5)
+    yield arrow_up(x + 3.0, y - (tile.above - arrow) / 2, arrow, PALE)
+    words = _fitting(choices, tile.width - 8.5)
+    yield Text(x + 6.0, base, words, _SMALL, ink=GREY)
+
+
+def _name(tile: Tile) -> str:
+    return f"landmark {tile.landmark} · part {tile.number} of {tile.parts}"
+
+
+def _ruler(x: float, bottom: float) -> Iterator[Item]:
+    """Ten centimetres upright, for the codes stand upright too; the scale marks are to the left."""
+    role: Role = "ruler"
+    top = bottom - RULER
+    yield Stroke(((x, top), (x, bottom)), BLACK, 0.2, role=role)
+    for half in range(21):
+        y = bottom - half * RULER / 20
+        length = 1.4 if half % 2 else 3.0 if half % 10 else 4.0
+        yield Stroke(((x - length, y), (x, y)), BLACK, 0.2)
+    for number in (0, 5, 10):
+        y = bottom - number * RULER / 10
+        yield Text(x + 0.8, y + 0.8, str(number), 2.2)
+    words = "Print at 100 %: this ruler must be 100 mm long."
+    yield Text(x - 5.2, bottom - 4.0, words, 2.3, angle=90, ink=GREY)
+
+
+def _fitting(choices: Sequence[str], width: float, size: float = _SMALL) -> str:
+    """The first choice that is not longer than ``width``; nothing where none fits."""
+    return next((words for words in choices if text_width(words, size) <= width), "")

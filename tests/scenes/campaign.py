@@ -70,6 +70,7 @@ class Verdict:
     wrong_orange: int
     false: int
     seconds: float
+    note: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,6 +143,7 @@ def judge(scene: Scene, marks: Marks, seconds: float) -> Verdict:
         sum(scene.truths[index].orange_surround for _, index in marks.wrong),
         len(marks.false),
         seconds,
+        scene.note,
     )
 
 
@@ -275,8 +277,8 @@ def figures(readings: Iterable[Reading]) -> dict[str, Any]:
     return out
 
 
-def summary(verdicts: Sequence[Verdict]) -> dict[str, Any]:
-    """All figures of a campaign, by family."""
+def summary(verdicts: Sequence[Verdict], words: Sequence[str] = ()) -> dict[str, Any]:
+    """All figures of a campaign, by family; ``words`` split it by what the notes say."""
     out: dict[str, Any] = {}
     for family in dict.fromkeys(verdict.family for verdict in verdicts):
         ours = [verdict for verdict in verdicts if verdict.family == family]
@@ -308,6 +310,16 @@ def summary(verdicts: Sequence[Verdict]) -> dict[str, Any]:
                 one for one in readings if low <= one.range < low + STEP
             )
             for low in places
+        }
+        row["words"] = {
+            f"{'with' if there else 'without'} {word}": figures(
+                reading
+                for verdict in ours
+                if (word in verdict.note) == there
+                for reading in verdict.readings
+            )
+            for word in words
+            for there in (True, False)
         }
         out[family] = row
     return out
@@ -348,7 +360,7 @@ def table(result: dict[str, Any]) -> str:
         if "orange" in row:
             line("  surround orange", row["orange"])
             line("  surround not orange", row["plain"])
-        for place, part in row["distance"].items():
+        for place, part in (row["words"] | row["distance"]).items():
             line(f"  {place}", part)
         if "hidden" in row:
             lines.append(f"  partly hidden: {row['hidden']}, of them read {row['hidden_read']}")
@@ -387,6 +399,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--save-misses", type=Path, help="folder for annotated pictures")
     parser.add_argument("--cache", type=Path, help="folder that keeps rendered pictures")
+    parser.add_argument(
+        "--by",
+        nargs="+",
+        default=(),
+        metavar="WORD",
+        help="split by words of the notes, such as mosaic, 4:2:0, jpeg, sharpened",
+    )
     options = parser.parse_args(arguments)
     verdicts = run(
         options.families,
@@ -398,7 +417,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         keep=options.cache,
         misses=options.save_misses,
     )
-    result = summary(verdicts)
+    result = summary(verdicts, options.by)
     if options.json is not None:
         options.json.write_text(json.dumps(result, indent=1) + "\n")
     sys.stdout.write(table(result) + "\n")

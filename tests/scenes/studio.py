@@ -116,7 +116,7 @@ def _draw(
             readout=rng.uniform(0.010, 0.033),
             exposure=rng.uniform(0.002, 0.012),
         )
-    lighting = draw_lighting(rng) if photo else draw_lighting(rng, 6500.0, 2900.0)
+    lighting = draw_lighting(rng) if photo else draw_lighting(rng, 6500.0, 2900.0, 1.5)
     return _Lot(family, photo, eye, lighting, kinds)
 
 
@@ -262,7 +262,7 @@ def _draw_sensor(lot: _Lot, picture: Floats, rng: Rng) -> Sensor:
         key, electrons = rng.uniform(0.4, 0.8), rng.uniform(2000, 10000)
     else:
         key, electrons = rng.uniform(0.13, 0.3), rng.uniform(2500, 8000)
-    compressed = rng.random() < (0.8 if hard else 0.3)
+    compressed = rng.random() < (0.8 if hard else 0.15)
     return Sensor(
         gains * key / usual,
         electrons,
@@ -272,9 +272,9 @@ def _draw_sensor(lot: _Lot, picture: Floats, rng: Rng) -> Sensor:
         tone=str(rng.choice(["srgb", "power", "curve"])),
         gamma=rng.uniform(2.0, 2.4),
         sharpening=rng.uniform(0.2, 0.7) if rng.random() < 0.3 else 0.0,
-        mosaic=bool(rng.random() < 0.3),
+        mosaic=bool(rng.random() < (0.3 if hard else 0.2)),
         quality=int(rng.integers(60 if hard else 85, 96)) if compressed else None,
-        subsampled=bool(rng.random() < 0.6),
+        subsampled=bool(rng.random() < (0.6 if hard else 0.4)),
     )
 
 

@@ -59,6 +59,11 @@ class Lighting:
             light += np.outer(facing, lamp.color)
         return light
 
+    def on_floor(self) -> NDArray[np.float64]:
+        """Light on what lies flat."""
+        direct = sum((lamp.direction[2] * lamp.color for lamp in self.lamps), np.zeros(3))
+        return np.asarray(self.ambient + direct)
+
 
 @dataclass(frozen=True, slots=True)
 class Paint:
@@ -70,8 +75,18 @@ class Paint:
     sharpness: float
 
 
-def draw_lighting(rng: Rng, coolest: float = 7500.0, warmest: float = 2700.0) -> Lighting:
-    """One to three lamps of one or two temperatures, and light from all around."""
+def draw_lighting(
+    rng: Rng, coolest: float = 7500.0, warmest: float = 2700.0, aside: float = 1.9
+) -> Lighting:
+    """One to three lamps of one or two temperatures, and light from all around.
+
+    Args:
+        rng: chance.
+        coolest: highest temperature of a lamp, kelvin.
+        warmest: lowest temperature.
+        aside: how far from behind the camera lamps stand at most, radians: at more than a quarter
+            turn they light the sides of what the camera sees.
+    """
 
     def kelvin() -> float:
         return 1e6 / rng.uniform(1e6 / coolest, 1e6 / warmest)
@@ -79,8 +94,7 @@ def draw_lighting(rng: Rng, coolest: float = 7500.0, warmest: float = 2700.0) ->
     first, second = kelvin(), kelvin()
     lamps = []
     for index in range(int(rng.integers(1, 4))):
-        # Behind the camera or to its sides: a lamp behind the poles lights what nobody sees.
-        azimuth = np.pi + rng.uniform(-1.9, 1.9)
+        azimuth = np.pi + rng.uniform(-aside, aside)
         height = rng.uniform(0.15, 1.2)
         toward = np.array(
             [np.cos(azimuth) * np.cos(height), np.sin(azimuth) * np.cos(height), np.sin(height)]

@@ -51,15 +51,20 @@ class Eye:
         when = (rows - self.center[1]) / self.height * self.readout + late
         return np.asarray(self.pan_rate * when)
 
-    def rays(self, columns: Array, rows: Array, late: float = 0.0) -> tuple[Array, Array, Array]:
-        """Directions (x, y, z) seen at ``columns`` (n) of ``rows`` (m x 1): each m x n."""
+    def rays(
+        self, columns: Array, rows: Array, late: float = 0.0, turn: float = 0.0
+    ) -> tuple[Array, Array, Array]:
+        """Directions (x, y, z) seen at ``columns`` (n) of ``rows`` (m x 1): each m x n.
+
+        ``turn`` turns them to the left, radians.
+        """
         side = (self.center[0] - columns) / self.constant
         rise = (self.center[1] - rows) / self.constant
         cos, sin = math.cos(self.roll), math.sin(self.roll)
         side, rise = side * cos - rise * sin, side * sin + rise * cos
         cos, sin = math.cos(self.pitch), math.sin(self.pitch)
         ahead, rise = cos - rise * sin, sin + rise * cos
-        yaw = self.yaw(rows, late)
+        yaw = self.yaw(rows, late) + turn
         cos_yaw, sin_yaw = np.cos(yaw), np.sin(yaw)
         return ahead * cos_yaw - side * sin_yaw, ahead * sin_yaw + side * cos_yaw, rise
 
@@ -250,10 +255,10 @@ def _samples(
         cover = np.clip((radius - np.abs(aside)) / width + 0.5, 0.0, 1.0)
     else:
         along = -origin[0] / toward[0]
-        place = origin[1] + along * toward[1]
-        across = np.clip(place / radius, -1.0, 1.0)
+        beside = origin[1] + along * toward[1]
+        across = np.clip(beside / radius, -1.0, 1.0)
         width = pole.range * (small + moved / eye.constant) / math.cos(pole.turn)
-        cover = np.clip((radius - np.abs(place)) / width + 0.5, 0.0, 1.0)
+        cover = np.clip((radius - np.abs(beside)) / width + 0.5, 0.0, 1.0)
     height = origin[2] + along * toward[2]
     tall = pole.range * small
     low = np.clip(height - tall / 2, 0.0, kind.height)
@@ -266,22 +271,21 @@ def _samples(
         high - low, 1e-9
     )
     light, shine = _shading(pole, lighting)
-    table = np.linspace(-1.0, 1.0, len(light))
+    place = ((across + 1) * (len(light) - 1) / 2 + 0.5).astype(np.int16)
     weight = cover * (1.0 + pole.fade * (height / kind.height * 2 - 1))
+    dark, orange = pole.paint.dark, pole.paint.bright
     out = np.empty((*cover.shape, 4), np.float32)
-    for channel in range(3):
-        dark, orange = pole.paint.dark[channel], pole.paint.bright[channel]
-        sent = (dark + (orange - dark) * bright) * np.interp(across, table, light[:, channel])
-        if pole.paint.gloss:
-            sent += np.interp(across, table, shine[:, channel])
-        out[..., channel] = sent * weight
+    # Light on black and what orange adds to it, both known for every place across.
+    out[..., :3] = (light * dark + shine).astype(np.float32)[place]
+    out[..., :3] += bright[..., None] * (light * (orange - dark)).astype(np.float32)[place]
+    out[..., :3] *= weight[..., None]
     out[..., 3] = cover
     return out
 
 
 def _shading(pole: Pole, lighting: Lighting) -> tuple[Array, Array]:
     """Light that falls on the landmark and that it mirrors, from one side to the other: n x 3."""
-    across = np.linspace(-1.0, 1.0, 129)
+    across = np.linspace(-1.0, 1.0, 1025)
     curved = np.arcsin(across) if pole.kind.shape == "cylinder" else 0.0 * across
     azimuth = pole.facing + curved
     shine = np.zeros((len(across), 3))

@@ -71,8 +71,8 @@ def develop(light: Floats, sensor: Sensor, rng: Rng) -> Image:
 
 def _tone(value: Floats, sensor: Sensor) -> Floats:
     # Looked up along the square root: the curve is steep where it is dark.
-    steps = np.linspace(0.0, 1.0, 2049)
-    return np.interp(np.sqrt(value), steps, _curve_at(steps**2, sensor)).astype(np.float32)
+    levels = _curve_at(np.linspace(0.0, 1.0, 32768) ** 2, sensor).astype(np.float32)
+    return np.asarray(levels[(np.sqrt(value) * 32767 + 0.5).astype(np.uint16)])
 
 
 def _curve_at(value: NDArray[np.float64], sensor: Sensor) -> NDArray[np.float64]:

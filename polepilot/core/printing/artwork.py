@@ -30,8 +30,8 @@ from polepilot.core.printing.tiles import (
     HEADER,
     MARGIN,
     RULER_STRIP,
+    THIN,
     Placed,
-    Tile,
 )
 
 RULER = 100.0
@@ -42,7 +42,7 @@ _BLEED = 4.0
 """How far the colours go on into the flap, so that a tube a little too thick shows no white."""
 _SMALL = 2.3
 _NARROW = 42.0
-"""On narrower tiles, arrow and number stand one above the other."""
+"""On narrower tiles, the figures of the collar shrink; on thin ones they are stacked."""
 
 
 def tile_items(placed: Placed, inks: tuple[Ink, Ink]) -> Iterator[Item]:
@@ -196,49 +196,62 @@ def _collar(placed: Placed) -> Iterator[Item]:
     """Above the first row: which way is up, and the landmark's number in large figures."""
     tile, x, y = placed.tile, placed.x, placed.y
     number = str(tile.landmark)
-    if tile.width < _NARROW:
+    part = f" · part {tile.number} of {tile.parts}" if tile.parts > 1 else ""
+    name = f"landmark {number}"
+    if tile.width < THIN:
         size = min(6.0, 0.9 * tile.width / text_width(number, 1.0, bold=True))
         middle = x + tile.width / 2
         yield Text(middle, y - 7.0, number, size, "middle", bold=True)
         yield arrow_up(middle, y - 1.5, min(5.0, 1.3 * tile.width))
-        words = f"TOP · landmark {number}"
-        yield Text(x + tile.width + tile.flap + 1.5, y - 4.0, words, _SMALL, ink=GREY)
+        yield _beside(placed, y - 4.0, [f"TOP · {name}{part}", f"TOP · {number}{part}", "TOP"])
         return
-    base = y - 3.5
-    yield arrow_up(x + 4.2, base, 7.5)
-    yield Text(x + 8.5, base, "TOP", 4.2, bold=True)
-    start = x + 10.5 + text_width("TOP", 4.2, bold=True)
-    end = x + tile.width - 2.0
-    yield Text(end, base, number, 9.0, "end", bold=True)
-    end -= text_width(number, 9.0, bold=True) + 2.0
-    part = f" · part {tile.number} of {tile.parts}" if tile.parts > 1 else ""
-    bits = (tile.surface.segments - 5) // 2
-    short = f"part {tile.number}/{tile.parts}" if tile.parts > 1 else ""
-    choices = [f"landmark {number} · {bits} bits{part}", f"landmark {number}{part}", short]
+    base, scale = y - 3.5, min(1.0, tile.width / _NARROW)
+    yield arrow_up(x + 4.2 * scale, base, 7.5 * scale)
+    yield Text(x + 8.5 * scale, base, "TOP", 4.2 * scale, bold=True)
+    start = x + 10.5 * scale + text_width("TOP", 4.2 * scale, bold=True)
+    end = x + tile.width - 2.0 * scale
+    yield Text(end, base, number, 9.0 * scale, "end", bold=True)
+    end -= text_width(number, 9.0 * scale, bold=True) + 2.0
+    choices = [f"{name} · {(tile.surface.segments - 5) // 2} bits{part}", f"{name}{part}"]
     words = _fitting(choices, end - start)
-    yield Text((start + end) / 2, base, words, _SMALL, "middle", ink=GREY)
+    if words:
+        yield Text((start + end) / 2, base, words, _SMALL, "middle", ink=GREY)
+    else:  # in a line of their own, above the number
+        choices += [part.removeprefix(" · "), f"{tile.number}/{tile.parts}" if part else ""]
+        words = _fitting(choices, tile.width - 2)
+        yield Text(x + tile.width / 2, y - 10.9, words, 2.0, "middle", ink=GREY)
 
 
 def _glue_strip(placed: Placed) -> Iterator[Item]:
     """Above every other row: what it is, and what is glued onto it."""
     tile, x, y = placed.tile, placed.x, placed.y
-    above, name = f"part {tile.number - tile.columns}", _name(tile)
+    above = f"part {tile.number - tile.columns}"
+    part = f"part {tile.number} of {tile.parts}"
+    name = f"landmark {tile.landmark} · {part}"
     choices = [
         f"{name} · glue: {above} comes onto this strip, up to where the colours begin",
         f"{name} · glue: {above} comes onto this strip",
         f"{name} · glue under {above}",
         name,
+        f"{tile.landmark}: {part}",
         f"{tile.landmark}: {tile.number}/{tile.parts}",
     ]
     base = y - tile.above / 2 + 0.35 * _SMALL
-    arrow = min(5.0, tile.above - 1.5)
-    yield arrow_up(x + 3.0, y - (tile.above - arrow) / 2, arrow, PALE)
-    words = _fitting(choices, tile.width - 8.5)
-    yield Text(x + 6.0, base, words, _SMALL, ink=GREY)
+    arrow = min(5.0, tile.above - 1.5, 1.3 * tile.width)
+    yield arrow_up(x + min(3.0, tile.width / 2), y - (tile.above - arrow) / 2, arrow, PALE)
+    if tile.width < THIN:
+        yield _beside(placed, base, choices)
+    else:
+        words = _fitting(choices, tile.width - 7.0)
+        yield Text(x + 6.0, base, words, _SMALL, ink=GREY)
 
 
-def _name(tile: Tile) -> str:
-    return f"landmark {tile.landmark} · part {tile.number} of {tile.parts}"
+def _beside(placed: Placed, base: float, choices: Sequence[str]) -> Text:
+    """Words to the right of a narrow tile, in its column: they are cut away."""
+    tile = placed.tile
+    x = tile.width + tile.flap + 1.5
+    words = _fitting(choices, tile.outer_width - GUTTER - x)
+    return Text(placed.x + x, base, words, _SMALL, ink=GREY)
 
 
 def _ruler(x: float, bottom: float) -> Iterator[Item]:

@@ -248,11 +248,12 @@ def _figure(contents: Contents, x: float, y: float, width: float, height: float)
         name = f"part {tile.number}"
         if tile.columns > 1:
             name = f"parts {tile.number}–{tile.number + tile.columns - 1}"
-        if tile.parts > 1 and low - high > 3.0:
+        named = low - high > 8.0
+        if tile.parts > 1 and named:
             yield Text(side + 3.0, (low + high) / 2 + 1.0, name, 2.8)
         if not tile.last_row:
             yield Stroke(((side + 1.0, low), (side + 8.0, low)), PALE, 0.3)
-            if low - high > 3.0:
+            if named:
                 yield Text(side + 9.0, low + 1.0, joint_letter(tile.row), 2.8, bold=True)
     words = f"landmark {number}"
     yield Text(x + width / 2, foot + below + 5.0, words, 2.8, "middle", ink=GREY)

@@ -29,8 +29,8 @@ COLLAR, FOOT = 13.0, 7.0
 BELOW_SEAM = 4.0
 BETWEEN = 3.0
 """Between tiles one above the other."""
-NARROWEST = 46.0
-"""Columns are at least this wide, so that words have room."""
+THIN, WORDS_BESIDE = 20.0, 27.0
+"""Thinner tiles have their words beside them, in a wider column."""
 MOST_SHEETS = 1000
 
 _FINEST_CUT = 5.0
@@ -120,7 +120,8 @@ class Tile:
 
     @property
     def outer_width(self) -> float:
-        return max(NARROWEST, self.width + self.flap + 2 * GUTTER)
+        words = WORDS_BESIDE if self.width < THIN else 0.0
+        return self.width + self.flap + 2 * GUTTER + words
 
     @property
     def outer_height(self) -> float:

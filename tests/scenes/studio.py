@@ -14,7 +14,6 @@ from typing import get_args
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scenes import studio_things as things
 from scenes.studio_light import Floats, Lighting, Rng, draw_lighting, draw_paint
 from scenes.studio_optics import Eye, Layer, Pole, see
@@ -165,26 +164,26 @@ def _behind(lot: _Lot, poles: list[Pole], rng: Rng) -> Floats:
         wide = eye.width + 2 * math.ceil(abs(eye.pan_rate) * eye.readout * eye.constant)
         picture = things.photograph(wide, eye.height, rng)
         if eye.pan_rate:
-            shift = eye.constant * np.tan(eye.yaw(np.arange(eye.height)))
+            shift = eye.constant * np.tan(eye.yaw(np.arange(float(eye.height))))
             columns = np.arange(eye.width)[None, :] - shift[:, None] + (wide - eye.width) / 2
             rows = np.broadcast_to(np.arange(eye.height)[:, None], columns.shape)
-            picture = cv2.remap(
-                np.ascontiguousarray(picture),
-                columns.astype(np.float32),
-                rows.astype(np.float32),
-                cv2.INTER_LINEAR,
-            )
+            seen = columns.astype(np.float32), rows.astype(np.float32)
+            whole = np.ascontiguousarray(picture)
+            picture = np.asarray(cv2.remap(whole, *seen, cv2.INTER_LINEAR), np.float32)
         picture = np.ascontiguousarray(picture)
-        things.scatter(picture, rng, int(rng.integers(0, 6)))
+        things.scatter(picture, rng, int(rng.integers(0, 8 if lot.family == "empty" else 3)))
         if lot.family == "empty":
             _decoys(picture, rng)
         for pole in poles:
-            if rng.random() < 0.36:
+            if rng.random() < 0.13:
                 things.surround(picture, pole.outline(eye), pole.paint.bright, rng)
         picture *= field_over(picture.shape[:2], rng, 0.3)[..., None]
         picture *= lot.lighting.mean.astype(np.float32) * np.float32(rng.uniform(0.6, 1.2))
     if eye.smear > 0.02:
-        picture = cv2.filter2D(picture, -1, _streak(eye.smear), borderType=cv2.BORDER_REPLICATE)
+        streak = _streak(eye.smear)
+        picture = np.asarray(
+            cv2.filter2D(picture, -1, streak, borderType=cv2.BORDER_REPLICATE), np.float32
+        )
     return np.asarray(cv2.GaussianBlur(picture, (0, 0), eye.blur), np.float32)
 
 
@@ -197,12 +196,12 @@ def _decoys(picture: Floats, rng: Rng) -> None:
         things.ladder(picture, rng, paint)
 
 
-def _streak(length: float) -> NDArray[np.float32]:
+def _streak(length: float) -> Floats:
     """A row of weights that blurs by ``length`` pixels, which need not be whole."""
     half = math.ceil(length / 2 + 0.5)
     place = np.arange(-half, half + 1)
     weights = np.clip(length / 2 - np.abs(place) + 0.5, 0.0, 1.0)
-    return (weights / weights.sum()).astype(np.float32)[None, :]
+    return np.asarray((weights / weights.sum())[None, :], np.float32)
 
 
 def _merges(pole: Pole, layers: Mapping[int, Layer], picture: Floats, lot: _Lot) -> bool:
@@ -236,7 +235,7 @@ def _hide(
     hidden = [False] * len(poles)
     for index in np.nonzero(chosen)[0]:
         mask, color = things.occluder(picture.shape[:2], poles[index], lot.eye, rng)
-        mask = cv2.GaussianBlur(mask, (0, 0), lot.eye.blur)
+        mask = np.asarray(cv2.GaussianBlur(mask, (0, 0), lot.eye.blur), np.float32)
         picture += mask[..., None] * (color * light - picture)
         for other, pole in enumerate(poles):
             share = things.covered(mask, pole, lot.eye)

@@ -10,13 +10,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scenes.studio_light import Floats, Lighting, Paint
-from scipy.special import ndtr
 
 from polepilot.core.landmark import LandmarkKind, encode
 
-Array = NDArray[np.float64]
+Array = Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,8 +179,9 @@ def spread(fine: Floats, steps: int, sigma: float) -> Floats:
     offsets = np.arange(-reach * steps, (reach + 1) * steps)
     place = (offsets - (steps - 1) / 2) / steps
     sigma = max(sigma, 1e-3)
-    taps = ndtr((place + 0.5) / sigma) - ndtr((place - 0.5) / sigma)
-    taps = (taps / taps.sum()).astype(np.float32)
+    below = np.array([math.erf((p - 0.5) / sigma / math.sqrt(2)) for p in place])
+    above = np.array([math.erf((p + 0.5) / sigma / math.sqrt(2)) for p in place])
+    taps = ((above - below) / (above - below).sum()).astype(np.float32)
     pad = reach * steps
     for _ in range(2):
         count = fine.shape[0] // steps

@@ -35,10 +35,10 @@ def look_up(field: Floats, x: Floats, y: Floats) -> Floats:
     size = field.shape[0]
     column = (x * size).astype(np.int32) & (size - 1)
     row = (y * size).astype(np.int32) & (size - 1)
-    return field[row, column]
+    return np.asarray(field[row, column])
 
 
-def soft_color(rng: Rng, least: float, most: float, strength: float = 0.22) -> NDArray[np.float64]:
+def soft_color(rng: Rng, least: float, most: float, strength: float = 0.22) -> Floats:
     """A reflectance of little saturation, linear RGB."""
     hue, saturation = rng.random(), rng.uniform(0, strength)
     return rng.uniform(least, most) * np.array(colorsys.hsv_to_rgb(hue, saturation, 1.0))

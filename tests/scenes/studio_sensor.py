@@ -95,8 +95,8 @@ def _mosaic(value: Floats, sensor: Sensor, rng: Rng) -> Floats:
     raw += spread * rng.standard_normal(raw.shape, np.float32)
     counts = np.clip(np.rint(raw * 60000.0) + 500, 0, 65535).astype(np.uint16)
     counts = np.minimum(counts, np.uint16(60500))
-    full = cv2.cvtColor(counts, cv2.COLOR_BayerRGGB2RGB).astype(np.float32)
-    return (full - 500) / 60000.0
+    full = np.asarray(cv2.cvtColor(counts, cv2.COLOR_BayerRGGB2RGB), np.float32)
+    return np.asarray((full - 500) / 60000.0)
 
 
 def _jpeg(image: Image, sensor: Sensor) -> Image:

@@ -15,14 +15,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import skimage.data
-from numpy.typing import NDArray
 from scenes.studio_light import Floats, Rng
 from scenes.studio_optics import Eye, Pole
 from scenes.studio_room import clouds
 
 from polepilot.core.landmark import decode
 
-Mask = NDArray[np.float32]
+Mask = Floats
 _SHIPPED = (
     *("astronaut", "brick", "camera", "chelsea", "coffee", "coins", "grass", "gravel"),
     *("hubble_deep_field", "immunohistochemistry", "retina", "rocket", "motorcycle_left"),
@@ -40,8 +39,7 @@ def photographs() -> tuple[Floats, ...]:
     learn = find_spec("sklearn")
     if learn is not None and learn.origin is not None:
         images = Path(learn.origin).parent / "datasets" / "images"
-        # Twice: one is full of orange petals.
-        files += sorted(images.glob("*.jpg")) * 2
+        files += sorted(images.glob("*.jpg"))
     loaded = []
     for path in files:
         image = cv2.imread(str(path), cv2.IMREAD_COLOR)
@@ -55,7 +53,10 @@ def photographs() -> tuple[Floats, ...]:
 
 def photograph(width: int, height: int, rng: Rng) -> Floats:
     """A piece of a photograph, turned over or not, its hues a little shifted."""
-    source = photographs()[int(rng.integers(len(photographs())))]
+    choice = int(rng.integers(len(photographs())))
+    if photographs()[choice].shape[0] > 1000 and rng.random() < 0.7:
+        choice = int(rng.integers(len(photographs())))  # the retina: all orange, seldom met
+    source = photographs()[choice]
     rows, columns = source.shape[:2]
     shape = width / height
     tall = rng.uniform(0.45, 1.0) * min(rows, columns / shape)
@@ -63,18 +64,21 @@ def photograph(width: int, height: int, rng: Rng) -> Floats:
     top, left = rng.uniform(0, rows - tall), rng.uniform(0, columns - wide)
     piece = source[int(top) : int(top + tall), int(left) : int(left + wide)]
     shrink = piece.shape[0] > height
-    piece = cv2.resize(
-        piece, (width, height), interpolation=cv2.INTER_AREA if shrink else cv2.INTER_CUBIC
-    )
+    how = cv2.INTER_AREA if shrink else cv2.INTER_CUBIC
+    piece = np.asarray(cv2.resize(piece, (width, height), interpolation=how), np.float32)
     if rng.random() < 0.5:
         piece = piece[:, ::-1]
+    if np.ptp(source[:: rows // 8, :: columns // 8], axis=2).max() < 0.01 and rng.random() < 0.7:
+        # A grey photograph of a surface: of brick, earth, straw, wood, stone.
+        tint = orange_color(rng) if rng.random() < 0.15 else np.clip(any_color(rng), 0.05, 1)
+        piece = piece * (tint / tint.max()).astype(np.float32)
     mix = np.eye(3) + rng.uniform(-0.08, 0.08, (3, 3))
     mix /= mix.sum(axis=1, keepdims=True)
     piece = piece @ mix.astype(np.float32) * np.float32(rng.uniform(0.6, 1.3))
     return np.clip(piece, 0.0, 1.2)
 
 
-def orange_color(rng: Rng, like: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+def orange_color(rng: Rng, like: Floats | None = None) -> Floats:
     """Of orange, red or wooden things; ``like``: of nearly that colour."""
     if like is not None:
         return np.asarray(like * rng.uniform(0.7, 1.2) * rng.uniform(0.88, 1.12, 3))
@@ -90,7 +94,7 @@ def orange_color(rng: Rng, like: NDArray[np.float64] | None = None) -> NDArray[n
     return red * np.array([1.0, green, rng.uniform(0.01, 0.1)])
 
 
-def any_color(rng: Rng) -> NDArray[np.float64]:
+def any_color(rng: Rng) -> Floats:
     """Black, grey, white or coloured."""
     if rng.random() < 0.3:
         return rng.uniform(0.02, 0.08) * np.ones(3)
@@ -98,7 +102,7 @@ def any_color(rng: Rng) -> NDArray[np.float64]:
     return np.array(color) ** 1.5
 
 
-def polygon(shape: tuple[int, int], corners: NDArray[np.float64]) -> Mask:
+def polygon(shape: tuple[int, int], corners: Floats) -> Mask:
     """Cover (0 to 1) of a polygon given in pixels, pixel centres being integers."""
     fine = 4
     low = np.floor(corners.min(axis=0)).astype(int) - 1
@@ -124,7 +128,7 @@ def box(left: float, top: float, right: float, bottom: float, tilt: float = 0.0)
     return np.asarray(corners @ np.array([[cos, sin], [-sin, cos]]) + middle)
 
 
-def blob(middle: NDArray[np.float64], size: NDArray[np.float64], rng: Rng) -> Floats:
+def blob(middle: Floats, size: Floats, rng: Rng) -> Floats:
     """Corners of a rounded, irregular shape (clothing, a bush)."""
     angle = np.linspace(0, 2 * math.pi, 40, endpoint=False)
     radius = np.ones(40)
@@ -134,7 +138,7 @@ def blob(middle: NDArray[np.float64], size: NDArray[np.float64], rng: Rng) -> Fl
     return np.asarray(middle + size * radius[:, None] * round_)
 
 
-def _paint_over(picture: Floats, mask: Mask, color: Floats | NDArray[np.float64]) -> None:
+def _paint_over(picture: Floats, mask: Mask, color: Floats | Floats) -> None:
     """``color``: one for all, or one per pixel."""
     picture += mask[..., None] * (np.asarray(color, np.float32) - picture)
 
@@ -144,10 +148,10 @@ def _crumple(shape: tuple[int, int], rng: Rng, depth: float, stretch: float = 1.
     field = clouds(int(rng.integers(4)))
     y = (np.arange(shape[0]) * rng.uniform(0.6, 2.0) * stretch + rng.integers(512)).astype(int)
     x = (np.arange(shape[1]) * rng.uniform(0.6, 2.0) / stretch + rng.integers(512)).astype(int)
-    return np.clip(1 + depth * field[y[:, None] & 511, x & 511], 0.1, 2.5)
+    return np.asarray(np.clip(1 + depth * field[y[:, None] & 511, x & 511], 0.1, 2.5))
 
 
-Thing = Callable[[Floats, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Rng], None]
+Thing = Callable[[Floats, Floats, Floats, Floats, Rng], None]
 """Draws itself into a picture: middle and half size in pixels, colour."""
 
 
@@ -253,9 +257,7 @@ def scatter(picture: Floats, rng: Rng, count: int) -> None:
         thing(picture, middle, half, orange_color(rng), rng)
 
 
-def surround(
-    picture: Floats, outline: NDArray[np.float64], like: NDArray[np.float64], rng: Rng
-) -> None:
+def surround(picture: Floats, outline: Floats, like: Floats, rng: Rng) -> None:
     """Something of the paint's hue behind a landmark: all round it, or at one side or end."""
     low, high = outline.min(axis=0), outline.max(axis=0)
     middle, half = (low + high) / 2, (high - low) / 2
@@ -275,7 +277,7 @@ def surround(
     thing(picture, middle, reach, color, rng)
 
 
-def false_pole(picture: Floats, rng: Rng, like: NDArray[np.float64], bits: int = 4) -> None:
+def false_pole(picture: Floats, rng: Rng, like: Floats, bits: int = 4) -> None:
     """A striped post that is no landmark: bars of one length, of any, or a code that is none."""
     rows, columns = picture.shape[:2]
     tall = rng.uniform(0.08, 0.8) * rows
@@ -306,7 +308,7 @@ def false_pole(picture: Floats, rng: Rng, like: NDArray[np.float64], bits: int =
         _paint_over(picture, mask, shade * (like if level else dark))
 
 
-def ladder(picture: Floats, rng: Rng, like: NDArray[np.float64]) -> None:
+def ladder(picture: Floats, rng: Rng, like: Floats) -> None:
     """Rungs between two posts."""
     rows, columns = picture.shape[:2]
     x, wide = rng.uniform(0.1, 0.8) * columns, rng.uniform(0.04, 0.2) * columns
@@ -323,7 +325,7 @@ def ladder(picture: Floats, rng: Rng, like: NDArray[np.float64]) -> None:
         )
 
 
-def covered(mask: Mask, pole: Pole, eye: Eye) -> NDArray[np.float64]:
+def covered(mask: Mask, pole: Pole, eye: Eye) -> Floats:
     """Share of every segment of a landmark (bottom first) that ``mask`` covers."""
     across, up = np.meshgrid(np.linspace(-0.94, 0.94, 9), (np.arange(9) + 0.5) / 9)
     shares = []
@@ -372,6 +374,7 @@ def occluder(shape: tuple[int, int], pole: Pole, eye: Eye, rng: Rng) -> tuple[Ma
         if share.max() >= 0.34 and share.mean() < 0.85:
             break
     hue = rng.random()
+    color: Floats
     if hue < 0.25:
         color = pole.paint.bright * rng.uniform(0.6, 1.2)
     elif hue < 0.4:

@@ -1,7 +1,8 @@
-"""Ids as people type them: ``1-15``, ``1,3,7-9``."""
+"""Ids as people type them after ``--ids``: ``1-15``, ``1,3,7-9``."""
 
 from __future__ import annotations
 
+from polepilot.core import landmark
 from polepilot.core.errors import InputError
 
 
@@ -11,16 +12,7 @@ def parse_ids(text: str, bits: int) -> list[int]:
     Raises:
         InputError: no such list, or an id that does not fit into ``bits``.
     """
-    largest = 2**bits - 1
-    chosen: set[int] = set()
-    for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
-        if not (first.isdecimal() and (last.isdecimal() if dash else True)):
-            raise InputError(f"--ids is {text!r}: expected ids and ranges, as 1-15 or 1,3,7-9.")
-        low, high = int(first), int(last) if dash else int(first)
-        if not 1 <= low <= high <= largest:
-            raise InputError(
-                f"--ids is {text!r}: {part.strip()!r} is not within 1 to {largest} ({bits} bits)."
-            )
-        chosen.update(range(low, high + 1))
-    return sorted(chosen)
+    try:
+        return list(landmark.parse_ids(text, bits))
+    except InputError as error:
+        raise InputError(f"--{error.message}") from error  # its words are our options

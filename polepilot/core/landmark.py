@@ -57,6 +57,30 @@ def decode(code: str) -> int | None:
     return int(middle[1::2][::-1], 2) or None
 
 
+def parse_ids(text: str, bits: int = 4) -> tuple[int, ...]:
+    """``"1,3,7-9"`` as sorted ids.
+
+    Raises:
+        InputError: no such list, an id that does not fit into ``bits``, or ``bits`` is not
+            supported.
+    """
+    _check_bits(bits)
+    largest = 2**bits - 1
+    chosen: set[int] = set()
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        if not (first.isdecimal() and (last.isdecimal() if dash else True)):
+            raise InputError(f"ids is {text!r}: expected ids and ranges, as 1-15 or 1,3,7-9.")
+        words = (first, last or first)
+        low, high = (int(word) if len(word) < 10 else largest + 1 for word in words)
+        if not 1 <= low <= high <= largest:
+            raise InputError(
+                f"ids is {text!r}: {part.strip()!r} is not within 1 to {largest} ({bits} bits)."
+            )
+        chosen.update(range(low, high + 1))
+    return tuple(sorted(chosen))
+
+
 def spacing(ids: Iterable[int], bits: int = 4) -> int:
     """In how many segments the codes of two of these ids differ at the least.
 

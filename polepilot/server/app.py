@@ -13,7 +13,16 @@ from starlette.websockets import WebSocket
 from polepilot.server import errors
 from polepilot.server.page import mount_page
 from polepilot.server.proxy import mount_panel
-from polepilot.server.routes import metrics, missions, plans, robot, runs, simulation, sites
+from polepilot.server.routes import (
+    landmarks,
+    metrics,
+    missions,
+    plans,
+    robot,
+    runs,
+    simulation,
+    sites,
+)
 from polepilot.server.schemas import Problem, SiteDocument
 from polepilot.server.security import Security
 from polepilot.server.version import VERSION
@@ -47,7 +56,7 @@ def create_app(services: Services | None = None) -> FastAPI:
     app.state.services = services
     errors.install(app)
     api = APIRouter(prefix="/api/v1")
-    for module in (robot, sites, plans, missions, runs, simulation):
+    for module in (robot, sites, landmarks, plans, missions, runs, simulation):
         api.include_router(module.router)
     api.add_api_websocket_route("/stream", _stream)
     app.include_router(api)

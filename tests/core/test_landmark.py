@@ -12,6 +12,7 @@ from polepilot.core.landmark import (
     decode,
     encode,
     id_set,
+    parse_ids,
     recommended_ids,
     spacing,
 )
@@ -162,3 +163,19 @@ def test_more_ids_than_there_are_far_apart(bits: int, count: int) -> None:
 def test_more_bits_are_proposed() -> None:
     with pytest.raises(InputError, match="or 6 bits"):
         recommended_ids(5, 20)
+
+
+@given(st.sets(st.integers(1, 255), min_size=1))
+def test_ids_are_read_as_they_are_written(ids: set[int]) -> None:
+    assert parse_ids(",".join(map(str, ids)), 8) == tuple(sorted(ids))
+    low, high = min(ids), max(ids)
+    assert parse_ids(f" {low} - {high}".replace(" - ", "-"), 8) == tuple(range(low, high + 1))
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", ",", "a", "1-", "-1", "1--2", "0", "16", "3-1", "²", "1;2", "9" * 5000, "1-" + "9" * 30],
+)
+def test_what_is_no_list_of_ids(text: str) -> None:
+    with pytest.raises(InputError, match=r"^ids is "):
+        parse_ids(text, 4)

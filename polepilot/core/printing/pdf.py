@@ -22,7 +22,10 @@ def pdf_bytes(drawing: Drawing) -> bytes:
 
     load_fonts()
     buffer = io.BytesIO()
-    canvas = Canvas(buffer, invariant=1, pageCompression=1, pdfVersion=(1, 6))
+    # Without a first typeface the library names one that is not embedded.
+    canvas = Canvas(
+        buffer, invariant=1, pageCompression=1, pdfVersion=(1, 6), initialFontName=REGULAR
+    )
     canvas.setTitle(drawing.title)
     canvas.setAuthor("")
     canvas.setSubject("Printed landmarks, to scale")

@@ -68,8 +68,8 @@ def test_pdf_asks_not_to_be_scaled_and_carries_its_typeface() -> None:
     assert b"/PrintScaling /None" in data
     fonts = re.findall(rb"/BaseFont /([\w+-]+)", data)
     assert fonts
-    used = [font for font in fonts if b"Vera" in font]
-    assert len(used) == data.count(b"/FontFile2 ")
+    assert len({font for font in fonts if b"Vera" not in font}) == 0
+    assert len(set(fonts)) == data.count(b"/FontFile2 ")
     assert b"/Title" in data
     assert b"anonymous" not in data
 

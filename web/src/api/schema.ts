@@ -41,6 +41,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/landmarks/sheet.pdf": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Landmark Sheet
+         * @description Landmarks to scale, with instructions: to print at 100 %, to cut out and to glue.
+         */
+        get: operations["landmark_sheet"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/mission/end": {
         parameters: {
             query?: never;
@@ -1334,6 +1354,66 @@ export interface operations {
             };
             /** @description There is no such thing. */
             404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description What was sent is not what was expected; `detail` names it. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    landmark_sheet: {
+        parameters: {
+            query: {
+                /** @description Bits per landmark: 4, 5, 6 or 8. */
+                bits?: number;
+                /** @description Thickness or width, metres. */
+                diameter?: number;
+                /** @description As 1-15 or 1,3,7-9. */
+                ids: string;
+                /** @description A4, Letter, 420x594 (mm), roll-610 (mm), ... */
+                paper?: string;
+                /** @description Length of a segment, metres. */
+                segment?: number;
+                /** @description A tube, or a flat sticker. */
+                shape?: "cylinder" | "flat";
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/pdf": string;
+                };
+            };
+            /** @description A foreign Host or Origin. */
+            403: {
                 headers: {
                     [name: string]: unknown;
                 };

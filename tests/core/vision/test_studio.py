@@ -44,14 +44,18 @@ def test_a_cylinder_lies_where_the_pinhole_camera_puts_it(away: float, bearing: 
     row = round(149.5 + 600 * 0.1 / away)
     assert layer.cover[row - layer.top].sum() == pytest.approx(right - left, abs=0.03)
     assert column_in(layer, row) == pytest.approx((left + right) / 2, abs=0.02)
-    # Its front, in the direction of its axis.
-    front = (away - KIND.diameter / 2) * math.cos(bearing)
-    top, bottom = 149.5 - 600 * 0.25 / front, 149.5 + 600 * 0.40 / front
-    middle = round(199.5 - 600 * math.tan(bearing)) - layer.left
+    # Its surface, in the direction of the column next to its axis.
+    column = round(199.5 - 600 * math.tan(bearing))
+    aim = math.atan((199.5 - column) / 600)
+    beside = away * math.sin(bearing - aim)
+    front = away * math.cos(bearing - aim) - math.sqrt(0.035**2 - beside**2)
+    depth = front * math.cos(aim)
+    top, bottom = 149.5 - 600 * 0.25 / depth, 149.5 + 600 * 0.40 / depth
+    middle = column - layer.left
     strip = layer.cover[:, middle] / layer.cover[row - layer.top, middle]
-    assert strip.sum() == pytest.approx(bottom - top, abs=0.05)
+    assert strip.sum() == pytest.approx(bottom - top, abs=0.02)
     center = layer.top + (strip * np.arange(len(strip))).sum() / strip.sum()
-    assert center == pytest.approx((top + bottom) / 2, abs=0.05)
+    assert center == pytest.approx((top + bottom) / 2, abs=0.02)
 
 
 def test_segments_lie_at_their_heights() -> None:
@@ -149,6 +153,13 @@ def test_other_resolutions_show_the_same_landmarks() -> None:
     large = scene("clean", 5, size=(800, 600), constant=1200.0)
     assert large.image.shape == (600, 800, 3)
     assert [truth.id for truth in large.truths] == [truth.id for truth in scene("clean", 5).truths]
+
+
+def test_other_kinds_can_be_asked_for() -> None:
+    kind = LandmarkKind(bits=6, segment=0.06, diameter=0.10, shape="flat")
+    shot = scene("clean-8-12", 2, kinds={40: kind, 55: kind})
+    assert {truth.id for truth in shot.truths} <= {40, 55}
+    assert all(truth.kind == kind for truth in shot.truths)
 
 
 def answer(number: int, bearing: float) -> Detection:

@@ -216,14 +216,11 @@ def _off(residual: Residual) -> str:
 
 
 def resized(camera: Camera, width: int, height: int) -> Camera:
-    """``camera`` for pictures cut and averaged down to ``width`` x ``height``, as capture does it.
+    """``camera`` for its pictures cut and averaged down to ``width`` x ``height``, as capture does.
 
     Constant and centre follow the pixels; the lens itself, in tangents, stays what it is.
     """
-    kept_columns = min(camera.width, round(camera.height * width / height))
-    kept_rows = min(camera.height, round(camera.width * height / width))
-    left, top = (camera.width - kept_columns) // 2, (camera.height - kept_rows) // 2
-    across, down = width / kept_columns, height / kept_rows
+    across, down, left, top = _cut((camera.width, camera.height), (width, height))
     return replace(
         camera,
         constant=camera.constant * math.sqrt(across * down),
@@ -232,6 +229,28 @@ def resized(camera: Camera, width: int, height: int) -> Camera:
         center_x=(camera.center_x + 0.5 - left) * across - 0.5,
         center_y=(camera.center_y + 0.5 - top) * down - 0.5,
     )
+
+
+def before_resizing(camera: Camera, width: int, height: int) -> Camera:
+    """The camera whose ``width`` x ``height`` pictures, ``resized``, are those of ``camera``."""
+    across, down, left, top = _cut((width, height), (camera.width, camera.height))
+    return replace(
+        camera,
+        constant=camera.constant / math.sqrt(across * down),
+        width=width,
+        height=height,
+        center_x=(camera.center_x + 0.5) / across - 0.5 + left,
+        center_y=(camera.center_y + 0.5) / down - 0.5 + top,
+    )
+
+
+def _cut(whole: tuple[int, int], wanted: tuple[int, int]) -> tuple[float, float, int, int]:
+    """Scale across and down, and the columns and rows that are cut off at the left and top."""
+    (columns, rows), (width, height) = whole, wanted
+    kept_columns = max(min(columns, round(rows * width / height)), 1)
+    kept_rows = max(min(rows, round(columns * height / width)), 1)
+    left, top = (columns - kept_columns) // 2, (rows - kept_rows) // 2
+    return width / kept_columns, height / kept_rows, left, top
 
 
 def _sigmas(samples: Sequence[KnownRange]) -> NDArray[np.float64]:

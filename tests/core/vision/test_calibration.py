@@ -18,6 +18,7 @@ from polepilot.core.vehicle import Camera
 from polepilot.core.vision.calibration import (
     ConstantFit,
     KnownRange,
+    before_resizing,
     fit_constant,
     judge,
     resized,
@@ -181,6 +182,9 @@ def test_another_size_of_picture(size: tuple[int, int]) -> None:
     )
     small = resized(whole, 400, 300)
     assert (small.width, small.height, small.distortion) == (400, 300, whole.distortion)
+    back = before_resizing(small, width, height)
+    assert back.constant == pytest.approx(whole.constant)
+    assert (back.center_x, back.center_y) == pytest.approx((whole.center_x, whole.center_y))
     # Two spots seen through the whole picture lie where the small camera says.
     for tangent_x, tangent_y in [(0.05, 0.04), (-0.11, -0.06)]:
         picture = np.zeros((height, width), np.uint8)

@@ -21,7 +21,7 @@ from polepilot.core.landmark import (
 
 if TYPE_CHECKING:
     from polepilot.core.printing.job import PrintJob
-    from polepilot.core.printing.tiles import Page
+    from polepilot.core.printing.pages import Page
 
 app = typer.Typer(help="Print landmarks to scale, choose their ids.")
 
@@ -183,8 +183,8 @@ def _summary(job: PrintJob, pages: tuple[Page, ...], files: list[Path]) -> str:
 
 def _fewer(job: PrintJob, sheets: int) -> Iterator[str]:
     """What larger paper would need, as "30 of A3"."""
+    from polepilot.core.printing.pages import arrange
     from polepilot.core.printing.paper import parse_paper
-    from polepilot.core.printing.tiles import arrange
 
     for name in _LARGER:
         try:

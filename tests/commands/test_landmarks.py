@@ -10,7 +10,9 @@ import pytest
 from printed import read_pdf, read_svg, rulers
 
 from polepilot.commands.main import run
-from polepilot.core.landmark import spacing
+from polepilot.core.landmark import SUPPORTED_BITS, id_set, parse_ids, spacing
+
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 @pytest.fixture(autouse=True)
@@ -221,3 +223,27 @@ def test_impossible_sets(options: list[str], capsys: pytest.CaptureFixture[str])
     assert err.startswith("--")
     assert err.count("\n") == 1
     assert "expected" in err
+
+
+def test_the_pictures_of_the_docs_are_what_is_printed() -> None:
+    """Mend them with the command that stands below them in docs/landmarks.md."""
+    assert run(["landmarks", "print", "--ids", "13", "--shape", "flat", "--out", "a.svg"]) == 0
+    for number in (1, 2):
+        committed = (DOCS / "images" / f"landmark-{number}.svg").read_text("utf-8")
+        assert Path(f"a-{number}.svg").read_text("utf-8") == committed
+
+
+def test_the_table_of_the_docs_is_true() -> None:
+    page = (DOCS / "landmarks.md").read_text("utf-8")
+    rows = [line.strip("| ").split(" | ") for line in page.splitlines() if line[:4] in ROWS]
+    table = {int(row[0]): row[1:] for row in rows if len(row) == 5 and "cm" not in row[1]}
+    assert set(table) == set(SUPPORTED_BITS)
+    for bits, cells in table.items():
+        for distance, cell in enumerate(cells, start=1):
+            size, _, listed = cell.partition(": ")
+            assert int(size) == len(id_set(bits, distance))
+            if listed:
+                assert parse_ids(listed, bits) == id_set(bits, distance)
+
+
+ROWS = {f"| {bits} " for bits in SUPPORTED_BITS}

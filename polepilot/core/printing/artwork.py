@@ -7,8 +7,8 @@ landmark it is, what is glued where.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 
 from polepilot.core.landmark import encode
 from polepilot.core.printing.drawing import (
@@ -24,6 +24,7 @@ from polepilot.core.printing.drawing import (
     Text,
 )
 from polepilot.core.printing.fonts import text_width
+from polepilot.core.printing.pages import Placed
 from polepilot.core.printing.tiles import (
     FOOT,
     GUTTER,
@@ -31,7 +32,6 @@ from polepilot.core.printing.tiles import (
     MARGIN,
     RULER_STRIP,
     THIN,
-    Placed,
 )
 
 RULER = 100.0
@@ -119,20 +119,39 @@ def ids_in_words(ids: Sequence[int], dash: str = "–") -> str:
     return ", ".join(words)
 
 
+def bright_runs(code: str) -> Iterator[tuple[int, int]]:
+    """First and last + 1 of the segments that are bright without a break, from the top."""
+    start = 0
+    for digit, run in groupby(code):
+        end = start + len(list(run))
+        if digit == "1":
+            yield start, end
+        start = end
+
+
 def _colours(placed: Placed, inks: tuple[Ink, Ink]) -> Iterator[Item]:
-    tile, surface = placed.tile, placed.tile.surface
-    bits = (surface.segments - 5) // 2
-    code = encode(tile.landmark, bits)
+    """Dark all over, bright runs on it: boxes side by side would show hairlines in between.
+
+    The colours that go on into the flap begin a little inside the code, for the same reason.
+    """
+    tile = placed.tile
     bleed = min(_BLEED, tile.flap / 2)
-    first = math.floor(tile.top / surface.segment + 1e-9)
-    last = math.ceil((tile.top + tile.height) / surface.segment - 1e-9)
-    for index in range(first, last):
-        top = max(index * surface.segment, tile.top)
-        bottom = min((index + 1) * surface.segment, tile.top + tile.height)
-        ink, y = inks[int(code[index])], placed.y + top - tile.top
-        yield Box(placed.x, y, tile.width, bottom - top, ink, "code")
-        if bleed:
-            yield Box(placed.x + tile.width, y, bleed, bottom - top, ink, "bleed")
+    if bleed:
+        inside = min(1.0, tile.width)
+        yield from _stripes(placed, inks, tile.width - inside, inside + bleed, "bleed")
+    yield from _stripes(placed, inks, 0.0, tile.width, "code")
+
+
+def _stripes(
+    placed: Placed, inks: tuple[Ink, Ink], left: float, width: float, role: Role
+) -> Iterator[Item]:
+    tile, segment = placed.tile, placed.tile.surface.segment
+    x, y, end = placed.x + left, placed.y, tile.top + tile.height
+    yield Box(x, y, width, tile.height, inks[0], role)
+    for first, last in bright_runs(encode(tile.landmark, tile.surface.bits)):
+        top, bottom = max(first * segment, tile.top), min(last * segment, end)
+        if bottom - top > 1e-9:
+            yield Box(x, y + top - tile.top, width, bottom - top, inks[1], role)
 
 
 def _outline(placed: Placed) -> Iterator[Item]:
@@ -212,7 +231,7 @@ def _collar(placed: Placed) -> Iterator[Item]:
     end = x + tile.width - 2.0 * scale
     yield Text(end, base, number, 9.0 * scale, "end", bold=True)
     end -= text_width(number, 9.0 * scale, bold=True) + 2.0
-    choices = [f"{name} · {(tile.surface.segments - 5) // 2} bits{part}", f"{name}{part}"]
+    choices = [f"{name} · {tile.surface.bits} bits{part}", f"{name}{part}"]
     words = _fitting(choices, end - start)
     if words:
         yield Text((start + end) / 2, base, words, _SMALL, "middle", ink=GREY)

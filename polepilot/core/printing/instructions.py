@@ -6,7 +6,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from polepilot.core.landmark import LandmarkKind, encode, id_set, spacing
-from polepilot.core.printing.artwork import arrow_up, ids_in_words, joint_letter, sheet_items
+from polepilot.core.printing.artwork import (
+    arrow_up,
+    bright_runs,
+    ids_in_words,
+    joint_letter,
+    sheet_items,
+)
 from polepilot.core.printing.drawing import (
     BLACK,
     GREY,
@@ -20,8 +26,9 @@ from polepilot.core.printing.drawing import (
     Text,
 )
 from polepilot.core.printing.fonts import wrap
+from polepilot.core.printing.pages import Page
 from polepilot.core.printing.paper import SIZES, Paper
-from polepilot.core.printing.tiles import COLLAR, FOOT, HEADER, MARGIN, RULER_STRIP, Page, Tile
+from polepilot.core.printing.tiles import COLLAR, FOOT, HEADER, MARGIN, RULER_STRIP, Tile
 
 _LARGEST_OWN = (300.0, 432.0)
 """Sheets up to this size carry the instructions themselves; larger ones would be a waste."""
@@ -139,7 +146,9 @@ def _subtitle(contents: Contents) -> str:
 def _facts(contents: Contents) -> Iterator[str]:
     count, sheets = len(contents.ids), len(contents.pages)
     tiles = contents.tiles
-    each = "in one piece" if len(tiles) == 1 else f"in {len(tiles)} parts each"
+    each = "in one piece" if len(tiles) == 1 else f"in {len(tiles)} parts"
+    if count > 1:
+        each += " each"
     noun = "landmark" if count == 1 else "landmarks"
     listed = ids_in_words(contents.ids)
     names = "" if contents.title.endswith(listed) else f": {listed}"
@@ -229,8 +238,9 @@ def _figure(contents: Contents, x: float, y: float, width: float, height: float)
     above, below = COLLAR * scale, FOOT * scale
     frame = ((left, top - above), (left + w, top - above), (left + w, foot + below))
     yield Box(left, top - above, w, foot + below - top + above, WHITE)
-    for index, digit in enumerate(encode(number, kind.bits)):
-        yield Box(left, top + index * segment, w, segment, contents.inks[int(digit)])
+    yield Box(left, top, w, tall * scale, contents.inks[0])
+    for first, last in bright_runs(encode(number, kind.bits)):
+        yield Box(left, top + first * segment, w, (last - first) * segment, contents.inks[1])
     yield Stroke((*frame, (left, foot + below), frame[0]), GREY, 0.2)
     yield arrow_up(left - 5.0, top + 1.0, 6.0)
     yield Text(left - 5.0, top + 4.2, "top", 2.8, "middle", bold=True)

@@ -14,8 +14,8 @@ from polepilot.core.landmark import LandmarkKind, encode
 from polepilot.core.printing.artwork import ids_in_words, sheet_items, tile_items
 from polepilot.core.printing.drawing import Drawing, Ink, Sheet
 from polepilot.core.printing.instructions import Contents, instructions
+from polepilot.core.printing.pages import Page, arrange
 from polepilot.core.printing.paper import Paper, parse_paper
-from polepilot.core.printing.tiles import Page, arrange
 
 ORANGE = Ink("#ff6600", (0.0, 0.65, 1.0, 0.0))
 RICH_BLACK = Ink("#000000", (0.5, 0.4, 0.4, 1.0))

@@ -18,8 +18,9 @@ from polepilot.core.observation import Image
 from polepilot.core.printing.drawing import Box, Ink, Item, Shape, Sheet, Stroke, Text
 from polepilot.core.printing.fonts import text_width
 from polepilot.core.printing.job import ORANGE, RICH_BLACK, PrintJob
+from polepilot.core.printing.pages import Page
 from polepilot.core.printing.paper import parse_paper
-from polepilot.core.printing.tiles import MARGIN, Page
+from polepilot.core.printing.tiles import MARGIN
 from polepilot.core.vehicle import Camera
 from polepilot.core.vision.detector import LandmarkDetector
 
@@ -63,6 +64,15 @@ def bounds(item: Item) -> Bounds:
     return min(xs) - wide, min(ys) - tall, max(xs) + wide, max(ys) + tall
 
 
+def area(boxes: list[Bounds]) -> float:
+    """Of boxes that do not overlap, which is checked."""
+    for i, a in enumerate(boxes):
+        for b in boxes[:i]:
+            wide, tall = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
+            assert wide < 1e-6 or tall < 1e-6
+    return sum((x1 - x0) * (y1 - y0) for x0, y0, x1, y1 in boxes)
+
+
 def codes(sheet: Sheet, page: Page) -> list[Bounds]:
     return [(p.x, p.y, p.x + p.tile.width, p.y + p.tile.height) for p in page.placed]
 
@@ -93,20 +103,25 @@ def test_sheets_put_together_are_the_code(name: str) -> None:
             painted[placed.tile.landmark].append(((x0 + dx, y0 + dy, x1 + dx, y1 + dy), item.ink))
     assert set(painted) == set(job.ids)
     for number, boxes in painted.items():
-        area = sum((b[2] - b[0]) * (b[3] - b[1]) for b, _ in boxes)
-        assert area == pytest.approx(width * segment * job.kind.segments)  # no gap, no overlap
+        dark = [box for box, ink in boxes if ink == job.dark]
+        bright = [box for box, ink in boxes if ink == job.bright]
+        assert len(dark) + len(bright) == len(boxes)
+        assert area(dark) == pytest.approx(width * segment * job.kind.segments)  # no gap
+        assert min(box[0] for box in dark) == pytest.approx(0, abs=1e-6)
+        assert max(box[2] for box in dark) == pytest.approx(width, abs=1e-6)
+        assert min(box[1] for box in dark) == pytest.approx(0, abs=1e-6)
+        assert max(box[3] for box in dark) == pytest.approx(segment * job.kind.segments, abs=1e-6)
         read = ""
         for index in range(job.kind.segments):
             top, bottom = index * segment, (index + 1) * segment
-            own = [
-                (box, ink) for box, ink in boxes if box[1] < bottom - 1e-6 and box[3] > top + 1e-6
+            inside = [
+                (x0, max(y0, top), x1, min(y1, bottom))
+                for x0, y0, x1, y1 in bright
+                if min(y1, bottom) - max(y0, top) > 1e-6
             ]
-            assert min(box[1] for box, _ in own) == pytest.approx(top, abs=1e-6)
-            assert max(box[3] for box, _ in own) == pytest.approx(bottom, abs=1e-6)
-            assert min(box[0] for box, _ in own) == pytest.approx(0, abs=1e-6)
-            assert max(box[2] for box, _ in own) == pytest.approx(width, abs=1e-6)
-            (ink,) = {ink for _, ink in own}
-            read += {job.bright: "1", job.dark: "0"}[ink]
+            share = area(inside) / (width * segment)
+            assert share == pytest.approx(round(share), abs=1e-6)  # all of a segment or nothing
+            read += str(round(share))
         assert decode(read) == number
 
 
@@ -117,6 +132,11 @@ def test_nothing_but_its_colours_is_in_the_code(name: str) -> None:
     for page, sheet in zip(pages, job.drawing(pages).sheets[1:], strict=True):
         for item in sheet.items:
             if isinstance(item, Box) and item.role == "code":
+                continue
+            if isinstance(item, Box) and item.role == "bleed":
+                # Painted before the code, which lies over it.
+                after = sheet.items[sheet.items.index(item) :]
+                assert any(isinstance(i, Box) and i.role == "code" for i in after)
                 continue
             x0, y0, x1, y1 = bounds(item)
             for code in codes(sheet, page):
@@ -214,8 +234,17 @@ def test_colours_go_on_under_the_flap_of_a_tube_and_nowhere_else() -> None:
         ]
 
     assert bleed(JOBS["flat"]) == []
-    wide = {round(box.width, 6) for box in bleed(JOBS["tube"])}
-    assert wide == {4.0}
+    job = JOBS["tube"]
+    assert {round(box.width, 6) for box in bleed(job)} == {5.0}  # 1 mm of it below the code
+    for page, sheet in zip(job.pages(), job.drawing().sheets[1:], strict=True):
+        (placed,) = page.placed
+        painted: dict[str, list[tuple[float, float, Ink]]] = defaultdict(list)
+        for item in sheet.items:
+            if isinstance(item, Box) and item.role:
+                painted[item.role].append((item.y, item.height, item.ink))
+                if item.role == "bleed":
+                    assert item.x + item.width == pytest.approx(placed.x + placed.tile.width + 4)
+        assert painted["bleed"] == painted["code"]
 
 
 @settings(max_examples=40)

@@ -42,6 +42,7 @@ FOREIGN_TO_CORE = {"fastapi", "starlette", "uvicorn", "pydantic", "viser", "type
 CLOCKS = {"time", "monotonic", "perf_counter", "time_ns", "monotonic_ns"}
 MAY_READ_A_CLOCK = {
     "core/vision/capture.py",
+    "core/vision/addresses.py",
     "core/vision/sources.py",
     "core/link/usb.py",
     "core/sim/clock.py",

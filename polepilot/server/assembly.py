@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import platformdirs
 import shapely
+import structlog
 
 from polepilot.core.geometry import Pose2D
 from polepilot.core.link.usb import SerialPort
@@ -30,6 +31,8 @@ from polepilot.server.runner import RobotPort, Twin
 from polepilot.server.services import DataFolder, Services, demo_site
 from polepilot.server.settings import Settings
 from polepilot.server.store import Store
+
+log = structlog.get_logger("polepilot.camera")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +84,10 @@ def assemble(settings: Settings, site: Site) -> Assembly:
         settings.camera.source,
         settings.model.camera,
         capture_size=(settings.camera.capture_width, settings.camera.capture_height),
+        controls=settings.controls,
         latency=settings.camera.latency_s,
         clock=clock.now,
+        notice=lambda note: log.warning("camera", note=note),
     )
     link = SerialPort(address, settings.link.baud_rate, clock.now)
     sensor = BackgroundSensor(_eye(camera, settings))

@@ -25,6 +25,7 @@ from polepilot.core.localization.localizer import LocalizerSettings as Localizat
 from polepilot.core.robot.robot import RobotSettings
 from polepilot.core.sim.motion import Disturbances
 from polepilot.core.vehicle import Camera, PanUnit, Proximity, RobotModel, Vehicle
+from polepilot.core.vision.devices import CameraControls
 from polepilot.server.settings_errors import explain_syntax, explain_validation, refusal
 from polepilot.server.settings_sections import (
     CameraSettings,
@@ -110,6 +111,16 @@ class Settings(Section):
                 max_range=self.proximity.max_range_m,
                 hard_limit=self.proximity.hard_limit_m,
             ),
+        )
+
+    @property
+    def controls(self) -> CameraControls:
+        """How a camera of this machine is set."""
+        return CameraControls(
+            autofocus=self.camera.autofocus,
+            focus=self.camera.focus,
+            exposure=self.camera.exposure_s,
+            white_balance=self.camera.white_balance_k,
         )
 
     @property

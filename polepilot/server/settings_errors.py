@@ -13,6 +13,8 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError
 
+from polepilot.core.vision.addresses import without_password
+
 _WORDS: dict[Any, str] = {
     int: "a whole number",
     float: "a number",
@@ -129,6 +131,7 @@ def _show(value: Any) -> str:
     if isinstance(value, bool):
         shown = str(value).lower()
     elif isinstance(value, str):
+        value = without_password(value)
         shown = '"' + value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
     elif isinstance(value, Mapping):
         shown = "a table"

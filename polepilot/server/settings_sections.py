@@ -82,7 +82,26 @@ class CameraSettings(Section):
     )
     capture_height: int = Field(default=1200, ge=32, le=8192, description="rows asked of a device")
     latency_s: float = Field(
-        default=0.05, ge=0, le=5, description="from mid exposure to the picture's arrival, seconds"
+        default=0.02,
+        ge=-0.1,
+        le=5,
+        description="from mid exposure to the picture's time stamp, seconds; a device's driver "
+        "stamps it, from elsewhere it is stamped when it arrives",
+    )
+    autofocus: bool = Field(
+        default=False, description="of a device; moves the lens, and the camera constant with it"
+    )
+    focus: int = Field(
+        default=-1,
+        ge=-1,
+        le=65535,
+        description="where a device's lens stands, in its driver's units; -1 leaves it",
+    )
+    exposure_s: float = Field(
+        default=0.0, ge=0, le=1, description="of a device, seconds; 0 is automatic"
+    )
+    white_balance_k: int = Field(
+        default=0, ge=0, le=20000, description="of a device, kelvin; 0 is automatic"
     )
 
     @model_validator(mode="before")
@@ -109,6 +128,8 @@ class CameraSettings(Section):
             )
         if isinstance(self.source, int) and self.source < 0:
             raise refusal("source", self.source, "a device number of 0 or more")
+        if self.autofocus and self.focus >= 0:
+            raise refusal("focus", self.focus, "-1, because camera.autofocus moves the lens")
         if self.source == "":
             raise refusal("source", self.source, '"simulated", a device, an address or a file')
         return self

@@ -1,11 +1,8 @@
-"""Cameras: files, folders, missing and forbidden devices, and one that dies and comes back."""
+"""Cameras: files, folders, and one that dies and comes back."""
 
 from __future__ import annotations
 
-import errno
 import os
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -18,8 +15,8 @@ import pytest
 from polepilot.core.errors import CameraError
 from polepilot.core.observation import Frame, Image
 from polepilot.core.vehicle import Camera
-from polepilot.core.vision import sources
-from polepilot.core.vision.capture import CameraCapture, fit
+from polepilot.core.vision.capture import CameraCapture, describe_fit, fit
+from polepilot.core.vision.stream import Stream
 
 CAMERA = Camera(width=80, height=60, rate=30.0)
 Start = Callable[..., CameraCapture]
@@ -90,16 +87,33 @@ class FakeCamera:
             self.plugged = False
             self._changed.notify_all()
 
-    def open(self) -> sources.Stream:
+    def open(self) -> Stream:
         self.opened += 1
         if not self.plugged:
             raise CameraError("there is no camera fake.", code="camera_missing")
         return FakeStream(self)
 
 
-class FakeStream:
-    live = True
+class Quiet:
+    """A stream with nothing to say of itself."""
 
+    live = True
+    notes: tuple[str, ...] = ()
+
+    def grab(self) -> bool:
+        time.sleep(0.004)
+        return True
+
+    def stamp(self) -> float | None:
+        return None
+
+    def retrieve(self) -> Image | None:
+        return gray(9)
+
+    def release(self) -> None: ...
+
+
+class FakeStream(Quiet):
     def __init__(self, camera: FakeCamera) -> None:
         self._camera = camera
         self._image = gray(0)
@@ -167,7 +181,8 @@ def test_folder_of_pictures_in_order_of_names(tmp_path: Path, start: Start) -> N
 def test_broken_picture_in_a_folder_is_named(tmp_path: Path, start: Start) -> None:
     (tmp_path / "0001.png").write_text("a text file")
     error = wait_for_error(start(str(tmp_path)))
-    assert "0001.png is no readable picture" in str(error)
+    assert "0001.png: is no picture" in str(error)
+    assert error.code == "camera_file"
 
 
 @pytest.mark.parametrize(
@@ -188,74 +203,18 @@ def test_file_that_is_no_video(
     assert capfd.readouterr().err == ""
 
 
+def test_pipe_is_no_video(tmp_path: Path, start: Start) -> None:
+    os.mkfifo(tmp_path / "pipe.avi")
+    assert "pipe.avi is no file" in str(wait_for_error(start(str(tmp_path / "pipe.avi"))))
+
+
+def test_pipe_in_a_folder_of_pictures_does_not_hang(tmp_path: Path, start: Start) -> None:
+    os.mkfifo(tmp_path / "0001.png")
+    assert "0001.png: is a pipe" in str(wait_for_error(start(str(tmp_path))))
+
+
 def test_empty_folder(tmp_path: Path, start: Start) -> None:
     assert "holds no picture" in str(wait_for_error(start(str(tmp_path))))
-
-
-def test_missing_device_lists_those_found(
-    tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name in ("video0", "video2", "video10"):
-        (tmp_path / name).touch()
-    monkeypatch.setattr(sources, "_DEVICES", tmp_path)
-    error = wait_for_error(start(7))
-    assert error.message == f"there is no camera {tmp_path}/video7."
-    found = ", ".join(f"{tmp_path}/{name}" for name in ("video0", "video2", "video10"))
-    assert error.remedy == f"Found: {found}."
-
-
-def test_no_device_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sources, "_DEVICES", tmp_path)
-    with pytest.raises(CameraError, match="No video device was found"):
-        sources.open_stream(0, rate=15, size=(640, 480))
-
-
-@pytest.mark.parametrize(
-    ("number", "code", "remedy"),
-    [
-        (errno.EACCES, "camera_permission", "sudo usermod -aG video robin"),
-        (errno.EBUSY, "camera_busy", "Close that program"),
-        (errno.ENODEV, "camera", "plug it in again"),
-    ],
-)
-def test_device_that_may_not_be_opened(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, code: str, remedy: str
-) -> None:
-    def refuse(*_: object) -> int:
-        raise OSError(number, os.strerror(number))
-
-    (tmp_path / "video0").touch()
-    monkeypatch.setattr(sources, "_DEVICES", tmp_path)
-    monkeypatch.setattr(sources, "_user", lambda: "robin")
-    monkeypatch.setattr(os, "open", refuse)
-    with pytest.raises(CameraError) as caught:
-        sources.open_stream(0, rate=15, size=(640, 480))
-    assert caught.value.code == code
-    assert remedy in caught.value.remedy
-
-
-def test_file_that_is_no_device_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "video0").touch()
-    monkeypatch.setattr(sources, "_DEVICES", tmp_path)
-    with pytest.raises(CameraError, match="delivers no pictures"):
-        sources.open_stream(0, rate=15, size=(640, 480))
-    with pytest.raises(CameraError, match="is no video device"):
-        sources.open_stream("/dev/null", rate=15, size=(640, 480))
-
-
-def test_address_without_camera_does_not_show_the_password() -> None:
-    # A process of its own, since FFmpeg takes its log level from the first use in a process.
-    program = """
-from polepilot.core.errors import CameraError
-from polepilot.core.vision.sources import open_stream
-try:
-    open_stream("rtsp://robin:secret@127.0.0.1:9/live", rate=15, size=(640, 480))
-except CameraError as error:
-    print(error)
-"""
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert done.stderr == ""
-    assert "no pictures from rtsp://...@127.0.0.1:9/live. Check address" in done.stdout
 
 
 def test_only_the_newest_picture_is_delivered(start: Start) -> None:
@@ -269,19 +228,12 @@ def test_only_the_newest_picture_is_delivered(start: Start) -> None:
 
 
 def test_faster_camera_is_thinned_to_the_rate(start: Start) -> None:
-    class Quick:
-        live = True
+    class Quick(Quiet):
         decoded = 0
 
-        def grab(self) -> bool:
-            time.sleep(0.004)
-            return True
-
-        def retrieve(self) -> Image:
+        def retrieve(self) -> Image | None:
             self.decoded += 1
-            return gray(9)
-
-        def release(self) -> None: ...
+            return super().retrieve()
 
     quick = Quick()
     capture = start(0, Camera(width=80, height=60, rate=20.0), opener=lambda: quick)
@@ -318,16 +270,9 @@ def test_silent_camera_says_since_when(start: Start) -> None:
     now = 100.0
     silent = threading.Event()
 
-    class Silent:
-        live = True
-
+    class Silent(Quiet):
         def grab(self) -> bool:
             return not silent.wait(10)
-
-        def retrieve(self) -> Image | None:
-            return None
-
-        def release(self) -> None: ...
 
     capture = start("fake", opener=Silent, clock=lambda: now)
     now = 101.9
@@ -354,3 +299,139 @@ def test_fit_averages_and_keeps_pixels_square() -> None:
     same = gray(3, 400, 300)
     assert fit(same, 400, 300) is same
     assert fit(gray(7, 40, 30), 400, 300).shape == (300, 400, 3)
+
+
+@pytest.mark.parametrize(
+    ("columns", "rows", "words"),
+    [
+        (1600, 1200, ""),
+        (400, 300, ""),
+        (1366, 1024, ""),  # a pixel and a half: nothing to speak of
+        (1280, 720, "lose 25% at left and right"),
+        (1280, 1024, "lose 6% at top and bottom"),
+        (320, 240, "smaller than the 400x300"),
+        (1, 5000, "smaller"),
+        (5000, 1, "smaller"),
+    ],
+)
+def test_what_is_lost_is_told(columns: int, rows: int, words: str) -> None:
+    told = describe_fit(columns, rows, 400, 300)
+    assert words in told
+    assert bool(told) == bool(words)
+    if told:
+        assert f"{columns}x{rows}" in told
+    assert fit(np.zeros((rows, columns, 3), np.uint8), 400, 300).shape == (300, 400, 3)
+
+
+@pytest.mark.parametrize(
+    ("columns", "rows"), [(1600, 1200), (1280, 720), (1280, 1024), (1366, 768)]
+)
+def test_one_constant_holds_in_both_directions(columns: int, rows: int) -> None:
+    """A square of the world stays a square, and the middle of the lens the middle."""
+    image = np.zeros((rows, columns), np.uint8)
+    middle_x, middle_y, half = columns // 2, rows // 2, rows // 4
+    image[middle_y - half : middle_y + half, middle_x - half : middle_x + half] = 255
+    small = fit(image, 400, 300).astype(float) / 255
+    across, down = small.sum(axis=1).max(), small.sum(axis=0).max()
+    scale = max(400 / columns, 300 / rows)
+    assert across == pytest.approx(2 * half * scale, rel=1e-3)
+    assert down == pytest.approx(across, rel=1e-3)
+    assert (small.sum(axis=0) * np.arange(400)).sum() / small.sum() == pytest.approx(199.5, abs=0.3)
+    assert (small.sum(axis=1) * np.arange(300)).sum() / small.sum() == pytest.approx(149.5, abs=0.3)
+
+
+def test_another_shape_and_other_notes_are_told_once(start: Start) -> None:
+    told: list[str] = []
+
+    class Wide(Quiet):
+        notes = ("the camera fake has no autofocus.",)
+
+        def retrieve(self) -> Image | None:
+            return gray(5, 1280, 720)
+
+    capture = start("fake", opener=Wide, notice=told.append)
+    for _ in range(3):
+        wait_for_frame(capture)
+    assert told[0] == "the camera fake has no autofocus."
+    assert "1280x720 pixels lose 25%" in told[1]
+    assert len(told) == 2
+
+
+def test_stamp_of_the_driver_counts(start: Start) -> None:
+    """A picture that waited for its turn is as old as its driver says."""
+
+    class Late(Quiet):
+        def stamp(self) -> float | None:
+            return time.monotonic() - 0.3
+
+    offset = 1000.0  # the robot's clock starts anywhere
+    capture = start("fake", opener=Late, latency=0.04, clock=lambda: time.monotonic() + offset)
+    frame = wait_for_frame(capture)
+    assert time.monotonic() + offset - frame.stamp == pytest.approx(0.34, abs=0.1)
+    assert time.monotonic() + offset - frame.stamp >= 0.34
+
+
+@pytest.mark.parametrize("stamp", [1.0e9, -5.0, 1.0])
+def test_stamp_of_another_clock_does_not_count(start: Start, stamp: float) -> None:
+    class Odd(Quiet):
+        def stamp(self) -> float | None:
+            return stamp if stamp > 1 else time.monotonic() + stamp * 3
+
+    before = time.monotonic()
+    frame = wait_for_frame(start("fake", opener=Odd, latency=0.04))
+    assert before - 0.04 <= frame.stamp <= time.monotonic() - 0.04
+
+
+def test_a_damaged_picture_is_passed_over_and_many_are_told(start: Start) -> None:
+    class Torn(Quiet):
+        pictures = 0
+
+        def retrieve(self) -> Image | None:
+            self.pictures += 1
+            return None if self.pictures % 2 else gray(7)
+
+    capture = start("fake", Camera(width=80, height=60, rate=240.0), opener=Torn)
+    for _ in range(3):
+        assert int(wait_for_frame(capture).image[0, 0, 0]) == 7
+
+    class Broken(Quiet):
+        def retrieve(self) -> Image | None:
+            return None
+
+    capture = start("fake", Camera(width=80, height=60, rate=240.0), opener=Broken)
+    error = wait_for_error(capture)
+    assert error.code == "camera_broken"
+    assert "nothing but damaged pictures" in error.message
+
+
+def test_a_fault_of_a_library_does_not_end_the_thread_nor_show_the_password(start: Start) -> None:
+    opened = 0
+
+    class Faulty(Quiet):
+        def grab(self) -> bool:
+            raise RuntimeError("rtsp://robin:secret@cam/live\nfailed")
+
+    def opener() -> Stream:
+        nonlocal opened
+        opened += 1
+        return Faulty() if opened == 1 else Quiet()
+
+    capture = start("rtsp://robin:secret@cam/live", opener=opener, backoff=(0.3,))
+    error = wait_for_error(capture)
+    assert str(error) == "the camera rtsp://...@cam/live failed (rtsp://...@cam/live failed)."
+    wait_for_frame(capture)
+
+
+def test_messages_of_a_silent_address_do_not_show_the_password(start: Start) -> None:
+    now = 100.0
+    silent = threading.Event()
+
+    class Silent(Quiet):
+        def grab(self) -> bool:
+            return not silent.wait(10)
+
+    capture = start("http://robin:s@ecret@cam/live?pwd=secret", opener=Silent, clock=lambda: now)
+    now = 110.0
+    with pytest.raises(CameraError, match=r"from http://\.\.\.@cam/live\.\.\. for 10 s"):
+        capture.read()
+    silent.set()

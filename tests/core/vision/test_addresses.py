@@ -1,0 +1,318 @@
+"""Network cameras: a server that streams, stops, stalls, refuses and comes back."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+import pytest
+
+from polepilot.core.errors import CameraError
+from polepilot.core.observation import Frame
+from polepilot.core.vehicle import Camera
+from polepilot.core.vision import addresses
+from polepilot.core.vision.addresses import is_address, open_address, shown
+from polepilot.core.vision.capture import CameraCapture
+
+pytestmark = pytest.mark.timeout(60)
+
+CAMERA = Camera(width=80, height=60, rate=60.0)
+RATE = 25.0
+STREAM = b"HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=next\r\n\r\n"
+
+
+class Server:
+    """A network camera on this machine. Picture n is grey with level n; ``sent`` says when."""
+
+    def __init__(self, port: int = 0, *, answer: bytes = STREAM, backlog: int = 0) -> None:
+        self.answer = answer
+        self.backlog = backlog
+        self.stalled = threading.Event()
+        self.sent: dict[int, float] = {}
+        self.requests: list[bytes] = []
+        self._lines: list[socket.socket] = []
+        self._door = socket.create_server(("127.0.0.1", port))
+        self.port = self._door.getsockname()[1]
+        self._threads = [threading.Thread(target=self._welcome)]
+        self._threads[0].start()
+
+    def address(self, who: str = "") -> str:
+        return f"http://{who}127.0.0.1:{self.port}/live"
+
+    def close(self) -> None:
+        self.stalled.set()
+        for line in (self._door, *self._lines):
+            with contextlib.suppress(OSError):
+                line.shutdown(socket.SHUT_RDWR)
+            line.close()
+        for thread in self._threads:
+            thread.join(timeout=10)
+            assert not thread.is_alive()
+
+    def _welcome(self) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                line, _ = self._door.accept()
+                self._lines.append(line)
+                self._threads.append(threading.Thread(target=self._serve, args=(line,)))
+                self._threads[-1].start()
+
+    def _serve(self, line: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            self.requests.append(line.recv(4096))
+            line.sendall(self.answer)
+            if self.answer is not STREAM:
+                if self.answer:
+                    line.shutdown(socket.SHUT_WR)
+                return
+            for number in itertools.count():
+                if number >= self.backlog and self.stalled.wait(1 / RATE):
+                    return
+                picture = np.full((120, 160, 3), number % 250, np.uint8)
+                data = cv2.imencode(".jpg", picture)[1].tobytes()
+                self.sent[number % 250] = time.monotonic()
+                head = b"--next\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n"
+                line.sendall(head % len(data) + data + b"\r\n")
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    made = Server()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Does not wait as long for cameras as on a robot."""
+    monkeypatch.setattr(addresses, "_OPEN_TIMEOUT", 0.6)
+    monkeypatch.setattr(addresses, "_READ_TIMEOUT", 0.6)
+    monkeypatch.setattr(addresses, "_PROBE_TIMEOUT", 0.6)
+
+
+def next_frame(capture: CameraCapture, limit: float = 15.0) -> Frame:
+    """The next picture, whatever errors come before it."""
+    end = time.monotonic() + limit
+    while time.monotonic() < end:
+        with contextlib.suppress(CameraError):
+            frame = capture.read()
+            if frame is not None:
+                return frame
+        time.sleep(0.002)
+    pytest.fail("no picture came")
+
+
+def next_error(capture: CameraCapture, limit: float = 15.0) -> CameraError:
+    """The next error, whatever pictures come before it."""
+    end = time.monotonic() + limit
+    while time.monotonic() < end:
+        try:
+            capture.read()
+        except CameraError as error:
+            return error
+        time.sleep(0.002)
+    pytest.fail("no error came")
+
+
+def test_pictures_come_as_they_are_sent(server: Server) -> None:
+    capture = CameraCapture(server.address(), CAMERA, latency=0.0)
+    levels = []
+    for _ in range(20):
+        frame = next_frame(capture)
+        level = round(float(frame.image.mean()))
+        levels.append(level)
+        # Stamped when it arrived, which was soon: not after a stay in a queue.
+        assert -0.01 <= frame.stamp - server.sent[level] < 0.5
+        assert frame.image.shape == (60, 80, 3)
+    assert np.all(np.diff(levels) > 0)
+    capture.close()
+
+
+def test_pictures_that_waited_are_passed_over() -> None:
+    """The first hundred are sent at once, as if they had piled up on the way."""
+    server = Server(backlog=100)
+    stream = open_address(server.address())
+    assert stream.grab()
+    image = stream.retrieve()
+    assert image is not None
+    # The line between waiting and not is drawn by this machine's scheduler.
+    assert round(float(image.mean())) >= 95
+    stream.release()
+    server.close()
+
+
+@pytest.mark.usefixtures("quick")
+def test_server_that_dies_and_comes_back(server: Server) -> None:
+    capture = CameraCapture(server.address("robin:secret@"), CAMERA, backoff=(0.05, 0.1))
+    next_frame(capture)
+    server.close()
+    codes, said = set(), ""
+    while "camera_refused" not in codes:
+        error = next_error(capture)
+        codes.add(error.code)
+        said += str(error)
+    assert codes <= {"camera_gone", "camera_refused", "camera_missing"}
+    assert "secret" not in said
+    again = Server(server.port)
+    assert next_frame(capture).image.shape == (60, 80, 3)
+    capture.close()
+    again.close()
+
+
+@pytest.mark.usefixtures("quick")
+def test_server_that_stalls(server: Server) -> None:
+    capture = CameraCapture(server.address(), CAMERA, silence=0.3, backoff=(0.05, 0.1))
+    next_frame(capture)
+    server.stalled.set()  # the line stays open, and nothing comes
+    begin = time.monotonic()
+    error = next_error(capture)
+    assert error.code in ("camera_silent", "camera_gone")
+    assert time.monotonic() - begin < 5
+    begin = time.monotonic()
+    capture.close()
+    assert time.monotonic() - begin < 3
+
+
+@pytest.mark.usefixtures("quick")
+def test_close_does_not_wait_for_a_camera_that_never_answers() -> None:
+    server = Server(answer=b"")
+    capture = CameraCapture(server.address(), CAMERA)
+    time.sleep(0.1)
+    begin = time.monotonic()
+    capture.close()
+    assert time.monotonic() - begin < 3
+    server.close()
+
+
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize(
+    ("answer", "code", "words"),
+    [
+        (b"HTTP/1.0 401 Unauthorized\r\n\r\n", "camera_permission", "asks for a name and a pass"),
+        (b"HTTP/1.1 403 Forbidden\r\n\r\n", "camera_permission", "asks for a name and a pass"),
+        (b"HTTP/1.0 404 Not Found\r\n\r\n", "camera_missing", "has no such path"),
+        (b"HTTP/1.0 503 Busy\r\n\r\n", "camera_missing", "answers with status 503"),
+        (b"HTTP/1.0 200 OK\r\nContent-Type: text/html\r\n\r\n<p>Hello", "camera_missing", "no vid"),
+        (b"\x00\xff\x17 what is this\r\n", "camera_silent", "nothing comes"),
+        (b"", "camera_silent", "the line is open, but nothing comes"),
+    ],
+)
+@pytest.mark.parametrize("scheme", ["http", "rtsp"])
+def test_server_that_answers_otherwise(scheme: str, answer: bytes, code: str, words: str) -> None:
+    server = Server(answer=answer.replace(b"HTTP", scheme.upper().encode()))
+    with pytest.raises(CameraError) as caught:
+        open_address(server.address("robin:s3cret@").replace("http", scheme))
+    server.close()
+    assert caught.value.code == code
+    assert words in str(caught.value)
+    assert f"no pictures from {scheme}://...@127.0.0.1:{server.port}/live: " in str(caught.value)
+    assert "s3cret" not in str(caught.value)
+    # The second look does not send the password again, least of all in the clear.
+    assert b"Authorization" not in server.requests[-1]
+
+
+@pytest.mark.parametrize("scheme", ["http", "rtsp"])
+def test_nobody_listens(scheme: str) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as door:
+        port = door.getsockname()[1]
+    with pytest.raises(
+        CameraError, match=f"127.0.0.1 refuses connections to port {port}"
+    ) as caught:
+        open_address(f"{scheme}://robin:s3cret@127.0.0.1:{port}/live")
+    assert "s3cret" not in str(caught.value)
+    assert caught.value.code == "camera_refused"
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (socket.gaierror(-2, "Name or service not known"), "the name cam.invalid is not known"),
+        (TimeoutError("timed out"), "cam.invalid does not answer"),
+        (OSError(113, "No route to host"), "cam.invalid does not answer"),
+        (OSError(101, "Network is unreachable"), r"cannot be reached \(Network is unreachable\)"),
+    ],
+)
+def test_way_to_the_camera(monkeypatch: pytest.MonkeyPatch, error: OSError, words: str) -> None:
+    class Closed:
+        def isOpened(self) -> bool:  # noqa: N802 - OpenCV's name
+            return False
+
+        def release(self) -> None: ...
+
+    def fail(*_: object) -> socket.socket:
+        raise error
+
+    monkeypatch.setattr(cv2, "VideoCapture", lambda *_: Closed())
+    monkeypatch.setattr(socket, "create_connection", fail)
+    with pytest.raises(CameraError, match=words) as caught:
+        open_address("rtsp://robin:secret@cam.invalid/live")
+    assert "secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "rtsp:/cam/live",
+        "gopher://cam/live",
+        "rtsp://",
+        "rtsp://robin:12/34@cam/live",
+        "rtsp://robin:pa#ss@cam/live",
+        "http://cam:99999/live",
+    ],
+)
+@pytest.mark.usefixtures("quick")
+def test_no_address(address: str) -> None:
+    with pytest.raises(CameraError, match="is no address of a camera") as caught:
+        open_address(address)
+    for part in ("robin", "12/34", "pa#ss"):
+        assert part not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        ("rtsp://cam:554/live", "rtsp://cam:554/live"),
+        ("rtsp://robin:secret@cam/live", "rtsp://...@cam/live"),
+        ("RTSP://robin:se@cr/et@cam/live", "RTSP://...@cam/live"),
+        ("http://cam/video?user=robin&pwd=secret", "http://cam/video..."),
+        ("rtsp://cam/user=robin_password=secret_channel=1.sdp", "rtsp://cam/user..."),
+        ("robin:secret@cam/live", "...@cam/live"),
+        ("drive.avi", "drive.avi"),
+        ("/home/robin/what?.avi", "/home/robin/what?.avi"),
+        ("two\nlines", "'two\\nlines'"),
+    ],
+)
+def test_what_people_see_of_an_address(source: str, expected: str) -> None:
+    assert shown(source) == expected
+
+
+def test_what_is_an_address() -> None:
+    assert is_address("rtsp://cam/live")
+    assert is_address("srt://cam:9000")
+    assert not is_address("drive.avi")
+    assert not is_address("/dev/video0")
+    assert not is_address("C:drive.avi")
+
+
+def test_nothing_but_the_error_is_said() -> None:
+    # A process of its own, since FFmpeg takes its log level from the first use in a process.
+    program = """
+from polepilot.core.errors import CameraError
+from polepilot.core.vision.sources import open_stream
+try:
+    open_stream("rtsp://robin:secret@127.0.0.1:9/live", rate=15, size=(640, 480))
+except CameraError as error:
+    print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stderr == ""
+    assert "no pictures from rtsp://...@127.0.0.1:9/live: 127.0.0.1 refuses" in done.stdout
+    assert "secret" not in done.stdout

@@ -15,6 +15,7 @@ from polepilot.core.printing.drawing import (
     BLACK,
     GREY,
     PALE,
+    WHITE,
     Box,
     Ink,
     Item,
@@ -36,6 +37,8 @@ from polepilot.core.printing.tiles import (
 
 RULER = 100.0
 """Length of the ruler on every sheet, mm."""
+LIGHT = 0.6
+"""A bright colour of more luminance than this has dark paper above and below it."""
 
 _LINE = 0.15
 _BLEED = 4.0
@@ -53,25 +56,16 @@ def tile_items(placed: Placed, inks: tuple[Ink, Ink]) -> Iterator[Item]:
 
 
 def _tile_items(placed: Placed, inks: tuple[Ink, Ink]) -> Iterator[Item]:
+    tile = placed.tile
+    light = inks[1].luminance > LIGHT
+    strong, faint = (WHITE, WHITE) if light else (BLACK, GREY)
+    if light:
+        yield from _dark_ends(placed, inks[0])
     yield from _colours(placed, inks)
     yield from _outline(placed)
     yield from _seam_marks(placed)
-    tile, x, y = placed.tile, placed.x, placed.y
-    yield from _collar(placed) if tile.first_row else _glue_strip(placed)
-    bottom = y + tile.height
-    if tile.last_row:
-        choices = [f"landmark {tile.landmark} · bottom", "bottom"]
-        words = _fitting(choices, tile.width)
-        yield Text(x + tile.width / 2, bottom + 4.6, words, _SMALL, "middle", ink=GREY)
-    else:
-        below = f"part {tile.number + tile.columns}"
-        choices = [
-            f"cut here: this edge goes onto {below}, where its colours begin",
-            f"cut here, glue onto {below}",
-            "cut here",
-        ]
-        words = _fitting(choices, tile.width - 4, 2.2)
-        yield Text(x + tile.width / 2, bottom + 3.0, words, 2.2, "middle", ink=GREY)
+    yield from _collar(placed, strong, faint) if tile.first_row else _glue_strip(placed)
+    yield _foot(placed, faint) if tile.last_row else _cut_here(placed)
 
 
 def sheet_items(width: float, height: float, heading: Sequence[str], page: str) -> Iterator[Item]:
@@ -170,9 +164,8 @@ def _outline(placed: Placed) -> Iterator[Item]:
         yield _line((left - reach, bottom), (left, bottom))
         yield _line((right, bottom), (right + reach, bottom))
     if not tile.first_row:
-        edge = placed.y
-        yield _line((left - reach, edge), (left - 0.5, edge), dash=0.8)
-        yield _line((right + 0.5, edge), (right + reach, edge), dash=0.8)
+        edge = placed.y - half
+        yield _line((left - reach, edge), (right + reach, edge), dash=0.8)
 
 
 def _line(a: tuple[float, float], b: tuple[float, float], dash: float = 0.0) -> Stroke:
@@ -211,7 +204,19 @@ def _seam_marks(placed: Placed) -> Iterator[Item]:
     yield Text(x, y + tile.height / 2, words, size, "middle", angle=90, ink=GREY)
 
 
-def _collar(placed: Placed) -> Iterator[Item]:
+def _dark_ends(placed: Placed, dark: Ink) -> Iterator[Item]:
+    """White paper beside a light colour would hide where the code begins and ends."""
+    tile, inside = placed.tile, min(1.0, placed.tile.height)
+    width = tile.width + tile.flap
+    if tile.first_row:
+        top = placed.y - tile.above
+        yield Box(placed.x, top, width, tile.above + inside, dark, "bleed")
+    if tile.last_row:
+        top = placed.y + tile.height - inside
+        yield Box(placed.x, top, width, inside + tile.below, dark, "bleed")
+
+
+def _collar(placed: Placed, strong: Ink, faint: Ink) -> Iterator[Item]:
     """Above the first row: which way is up, and the landmark's number in large figures."""
     tile, x, y = placed.tile, placed.x, placed.y
     number = str(tile.landmark)
@@ -220,25 +225,47 @@ def _collar(placed: Placed) -> Iterator[Item]:
     if tile.width < THIN:
         size = min(6.0, 0.9 * tile.width / text_width(number, 1.0, bold=True))
         middle = x + tile.width / 2
-        yield Text(middle, y - 7.0, number, size, "middle", bold=True)
-        yield arrow_up(middle, y - 1.5, min(5.0, 1.3 * tile.width))
+        yield Text(middle, y - 7.0, number, size, "middle", bold=True, ink=strong)
+        yield arrow_up(middle, y - 1.5, min(5.0, 1.3 * tile.width), strong)
         yield _beside(placed, y - 4.0, [f"TOP · {name}{part}", f"TOP · {number}{part}", "TOP"])
         return
     base, scale = y - 3.5, min(1.0, tile.width / _NARROW)
-    yield arrow_up(x + 4.2 * scale, base, 7.5 * scale)
-    yield Text(x + 8.5 * scale, base, "TOP", 4.2 * scale, bold=True)
+    yield arrow_up(x + 4.2 * scale, base, 7.5 * scale, strong)
+    yield Text(x + 8.5 * scale, base, "TOP", 4.2 * scale, bold=True, ink=strong)
     start = x + 10.5 * scale + text_width("TOP", 4.2 * scale, bold=True)
     end = x + tile.width - 2.0 * scale
-    yield Text(end, base, number, 9.0 * scale, "end", bold=True)
+    yield Text(end, base, number, 9.0 * scale, "end", bold=True, ink=strong)
     end -= text_width(number, 9.0 * scale, bold=True) + 2.0
     choices = [f"{name} · {tile.surface.bits} bits{part}", f"{name}{part}"]
     words = _fitting(choices, end - start)
     if words:
-        yield Text((start + end) / 2, base, words, _SMALL, "middle", ink=GREY)
+        yield Text((start + end) / 2, base, words, _SMALL, "middle", ink=faint)
     else:  # in a line of their own, above the number
         choices += [part.removeprefix(" · "), f"{tile.number}/{tile.parts}" if part else ""]
         words = _fitting(choices, tile.width - 2)
-        yield Text(x + tile.width / 2, y - 10.9, words, 2.0, "middle", ink=GREY)
+        yield Text(x + tile.width / 2, y - 10.9, words, 2.0, "middle", ink=faint)
+
+
+def _foot(placed: Placed, ink: Ink) -> Item:
+    """Below the last row."""
+    tile = placed.tile
+    words = _fitting([f"landmark {tile.landmark} · bottom", "bottom"], tile.width)
+    x, y = placed.x + tile.width / 2, placed.y + tile.height + 4.6
+    return Text(x, y, words, _SMALL, "middle", ink=ink)
+
+
+def _cut_here(placed: Placed) -> Item:
+    """Below every other row: where its edge goes."""
+    tile = placed.tile
+    below = f"part {tile.number + tile.columns}"
+    choices = [
+        f"cut here: this edge goes onto {below}, where its colours begin",
+        f"cut here, glue onto {below}",
+        "cut here",
+    ]
+    words = _fitting(choices, tile.width - 4, 2.2)
+    x, y = placed.x + tile.width / 2, placed.y + tile.height + 3.0
+    return Text(x, y, words, 2.2, "middle", ink=GREY)
 
 
 def _glue_strip(placed: Placed) -> Iterator[Item]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from polepilot.core.landmark import LandmarkKind, encode, id_set, spacing
 from polepilot.core.printing.artwork import (
+    LIGHT,
     arrow_up,
     bright_runs,
     ids_in_words,
@@ -17,7 +18,6 @@ from polepilot.core.printing.drawing import (
     BLACK,
     GREY,
     PALE,
-    WHITE,
     Box,
     Ink,
     Item,
@@ -164,12 +164,15 @@ def _facts(contents: Contents) -> Iterator[str]:
 def _steps(contents: Contents) -> Iterator[tuple[str, str]]:
     kind, tiles = contents.kind, contents.tiles
     rows, columns = tiles[0].rows, tiles[0].columns
+    # Inks that are known by their process colours are our own: orange and black.
+    own = contents.inks[1].cmyk is not None
+    bright = "orange" if own else "bright"
+    looks = "; the orange must look like a traffic cone, not like skin" if own else ""
     yield (
         "Print at 100 %",
         "Choose “actual size”, never “fit to page”. Take matt paper of 120 g/m² or more, or matt"
         " self-adhesive film: gloss mirrors lamps and windows, and a mirrored lamp is neither"
-        " of the two colours. Take the printer's best quality; the orange must look like a traffic"
-        " cone, not like skin.",
+        f" of the two colours. Take the printer's best quality{looks}.",
     )
     yield (
         "Measure the ruler on the sheets",
@@ -184,7 +187,7 @@ def _steps(contents: Contents) -> Iterator[tuple[str, str]]:
         )
     if columns > 1:
         cut += " Where a part joins another sideways, cut its left side along the colours."
-    yield ("Cut", cut + " White paper above the first colour and below the last one stays on.")
+    yield ("Cut", cut + " The paper above the first colour and below the last one stays on.")
     if columns > 1:
         yield (
             "Join the parts of a row",
@@ -196,7 +199,8 @@ def _steps(contents: Contents) -> Iterator[tuple[str, str]]:
         yield (
             "Join the rows" if columns > 1 else "Join the parts",
             "Glue each upper part onto the white strip of the next one: its lower edge lies"
-            f" exactly where the colours begin, and the half diamonds ({letters}) become whole."
+            " exactly on the dashed line, where the colours begin, and the half diamonds"
+            f" ({letters}) become whole."
             f" From the first colour to the last it must then be {_mm(kind.height)}; one"
             f" millimetre too much or too little is {0.1 / kind.height:.2g} % of every distance."
             " Then cut the long sides.",
@@ -216,7 +220,7 @@ def _steps(contents: Contents) -> Iterator[tuple[str, str]]:
     yield (
         "Set it up",
         "The arrow and the number are at the top: upside down it is another landmark. It stands"
-        " plumb, nothing covers any of it, and no other orange thing touches it. Measure"
+        f" plumb, nothing covers any of it, and no other {bright} thing touches it. Measure"
         " where it stands and draw it on the map.",
     )
     yield (
@@ -237,10 +241,12 @@ def _figure(contents: Contents, x: float, y: float, width: float, height: float)
     foot = top + tall * scale
     above, below = COLLAR * scale, FOOT * scale
     frame = ((left, top - above), (left + w, top - above), (left + w, foot + below))
-    yield Box(left, top - above, w, foot + below - top + above, WHITE)
-    yield Box(left, top, w, tall * scale, contents.inks[0])
+    dark, bright = contents.inks
+    if bright.luminance > LIGHT:
+        yield Box(left, top - above, w, above + tall * scale + below, dark)
+    yield Box(left, top, w, tall * scale, dark)
     for first, last in bright_runs(encode(number, kind.bits)):
-        yield Box(left, top + first * segment, w, (last - first) * segment, contents.inks[1])
+        yield Box(left, top + first * segment, w, (last - first) * segment, bright)
     yield Stroke((*frame, (left, foot + below), frame[0]), GREY, 0.2)
     yield arrow_up(left - 5.0, top + 1.0, 6.0)
     yield Text(left - 5.0, top + 4.2, "top", 2.8, "middle", bold=True)

@@ -336,3 +336,29 @@ def test_impossible_jobs_are_refused(fields: dict[str, object], expected: str) -
 def test_colours_are_six_digits(color: str) -> None:
     with pytest.raises(InputError, match="expected #rrggbb"):
         Ink(color)
+
+
+def test_a_light_code_ends_against_dark_paper() -> None:
+    """White on white would hide where the code begins: there it would be measured too long."""
+    job = JOBS["monochrome"]
+    for page, sheet in zip(job.pages(), job.drawing().sheets[1:], strict=True):
+        (placed,) = page.placed
+        tile = placed.tile
+        ends = [i for i in sheet.items if isinstance(i, Box) and i.ink == job.dark]
+        for wanted, y in (
+            (tile.first_row, placed.y - 1),
+            (tile.last_row, placed.y + tile.height + 1),
+        ):
+            assert any(box.y < y < box.y + box.height for box in ends) == wanted
+    orange = JOBS["tube"]
+    for page, sheet in zip(orange.pages(), orange.drawing().sheets[1:], strict=True):
+        for item in sheet.items:
+            if isinstance(item, Box):
+                assert item.y >= page.placed[0].y - 1e-6
+
+
+def test_instructions_speak_of_the_colours_there_are() -> None:
+    for name, orange in (("tube", True), ("monochrome", False)):
+        sheet = JOBS[name].drawing().sheets[0]
+        words = " ".join(item.words for item in sheet.items if isinstance(item, Text))
+        assert ("orange" in words) == orange

@@ -1,19 +1,45 @@
 """From pixels to metres and radians, and from the picture to the robot.
 
-The optical axis is horizontal, the picture upright. A landmark is vertical, so one segment of its
-front covers ``constant * segment / depth`` pixels at every height (Eq. 1). Deviations from Eq. 1,
-which takes depth for range: the depth along the optical axis becomes a horizontal distance
-(1 / cos(bearing)), and the axis lies behind the surface that is seen.
+One segment of a landmark's front covers ``constant * segment / depth`` pixels (Eq. 1). Deviations
+from Eq. 1, which takes that depth for the range: the depth along the optical axis becomes a
+horizontal distance (1 / cos(bearing)), the axis lies behind the surface that is seen, and a camera
+that looks up or down sees a vertical pole longer or shorter than it is.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from polepilot.core.geometry import wrap_angle
 from polepilot.core.landmark import LandmarkKind
 from polepilot.core.observation import Detection, RangeBearing
 from polepilot.core.vehicle import Camera
+from polepilot.core.vision.kernel import Strip
+
+PITCH_PRIOR = math.radians(1.5)
+"""A camera that is meant to look level does so within this."""
+TILT = math.radians(0.5)
+"""A landmark that is meant to stand upright does so within this."""
+FOOT_SIGMA = 0.05
+"""Metres by which the foot of a landmark may stand higher or lower than the robot's floor."""
+MOST_PITCH = math.radians(6)
+"""Where a landmark's foot seems to be farther off than this, it does not stand on the floor."""
+LEVEL = math.radians(2.5)
+"""A camera looks up or down by no more than this."""
+HIGHEST = 2.0
+"""Metres above the floor at which a landmark's middle may be, and half of its height more."""
+RANGE_FLOOR = 0.0004
+"""Share of the range that is uncertain besides what the fit knows: blur that is not Gaussian,
+grey levels that are not quite sRGB, roll."""
+UNIT_FACTOR = 1.15
+"""By how much the scale is less certain than a fit with independent noise says."""
+COLUMN_FACTOR = 1.0
+COLUMN_FLOOR = 0.06
+"""Pixels by which the strip's middle is uncertain besides what the fit knows."""
+LEAN_SIGMA = 0.004
+"""Columns per row by which a strip's lean is uncertain."""
 
 
 def depth_of(length: float, pixels: float, constant: float) -> float:
@@ -39,7 +65,7 @@ def column_of(bearing: float, camera: Camera) -> float:
 def range_of(
     unit: float, bearing: float, kind: LandmarkKind, camera: Camera, front: float = 1.0
 ) -> float:
-    """Horizontal distance from the camera's vertical axis to the landmark's axis, metres.
+    """Horizontal distance from a level camera's vertical axis to the landmark's axis, metres.
 
     Args:
         unit: pixels per segment.
@@ -51,11 +77,82 @@ def range_of(
     return depth / math.cos(bearing) + front * kind.axis_depth
 
 
-def half_width_of(distance: float, bearing: float, kind: LandmarkKind, camera: Camera) -> float:
-    """Half of the pixels that the landmark covers from left to right."""
-    half = math.asin(min(kind.diameter / 2 / distance, 1.0))
-    left = column_of(min(bearing + half, 1.5), camera)
-    return (column_of(max(bearing - half, -1.5), camera) - left) / 2
+@dataclass(frozen=True, slots=True)
+class Pitch:
+    """How far the camera looks up (radians) in one picture, and how sure that is."""
+
+    angle: float
+    sigma: float
+
+
+def pitch_of(strips: Sequence[tuple[Strip, LandmarkKind]], camera: Camera) -> Pitch:
+    """The camera's pitch, from all landmarks of a picture together.
+
+    Three witnesses: it is meant to look level; a pole's segments crowd towards the end that is
+    farther away (`Strip.sag`: near poles tell); a pole's foot stands on the floor
+    (``camera.mount_height`` below: far poles tell).
+    """
+    weight = 1 / PITCH_PRIOR**2
+    total = 0.0
+    for strip, kind in strips:
+        # sag = -segment sin(pitch) / depth, and depth = C segment / unit.
+        by_pixels = camera.constant / strip.unit
+        sigma = math.hypot(strip.sag_sigma * by_pixels, TILT)
+        if sigma < 10 * PITCH_PRIOR:
+            total += -strip.sag * by_pixels / sigma**2
+            weight += 1 / sigma**2
+        depth = by_pixels * kind.segment
+        seen = math.atan2(camera.center_y - strip.row, camera.constant)
+        standing = math.atan2(kind.height / 2 - camera.mount_height, depth)
+        if abs(standing - seen) < MOST_PITCH:
+            sigma = math.hypot(FOOT_SIGMA / depth, 0.002)
+            total += (standing - seen) / sigma**2
+            weight += 1 / sigma**2
+    return Pitch(total / weight, 1 / math.sqrt(weight))
+
+
+def stands(strip: Strip, kind: LandmarkKind, camera: Camera) -> bool:
+    """Whether a strip is where a landmark can be: not under the floor, nor out of a hand's reach.
+
+    Far stripes of other things are told from landmarks by this more than by anything else.
+    """
+    depth = depth_of(kind.segment, strip.unit, camera.constant)
+    seen = math.atan2(camera.center_y - strip.row, camera.constant)
+    lowest = depth * math.tan(min(seen + LEVEL, 1.5)) + camera.mount_height
+    highest = depth * math.tan(max(seen - LEVEL, -1.5)) + camera.mount_height
+    return lowest > -0.1 * kind.height and highest < HIGHEST + kind.height / 2
+
+
+def measure(strip: Strip, kind: LandmarkKind, pitch: Pitch, camera: Camera) -> Detection:
+    """A strip that was read, in metres and radians.
+
+    With the optical axis raised by the pitch, a piece of a vertical pole seen at elevation e, at
+    the angle a from the optical axis, covers cos(a)^2 / cos(e)^2 more pixels than Eq. 1 says.
+    """
+    # Rolling shutter and roll both lean a strip about the middle row: there it is where the
+    # landmark stands at the picture's stamp.
+    off = camera.center_y - strip.row
+    column = strip.column + strip.lean * off
+    bearing = math.atan2((camera.center_x - column) * math.cos(pitch.angle), camera.constant)
+    rise = off / camera.constant
+    elevation = math.tan(math.atan(rise) + pitch.angle)
+    longer = (1 + rise * rise) / (1 + elevation * elevation)
+    distance = range_of(strip.unit / longer, bearing, kind, camera, strip.front)
+    relative = math.hypot(
+        UNIT_FACTOR * strip.unit_sigma, RANGE_FLOOR, 2 * elevation * pitch.sigma, pitch.sigma**2
+    )
+    sigma = math.hypot(COLUMN_FACTOR * strip.column_sigma, COLUMN_FLOOR, LEAN_SIGMA * off)
+    half = kind.segments / 2
+    return Detection(
+        id=strip.id,
+        range=distance,
+        bearing=bearing,
+        column=strip.column,
+        top=strip.row - strip.unit * half / (1 - strip.sag * half),
+        bottom=strip.row + strip.unit * half / (1 + strip.sag * half),
+        range_sigma=relative * distance,
+        bearing_sigma=sigma * math.cos(bearing) ** 2 / camera.constant,
+    )
 
 
 def to_range_bearing(detection: Detection, stamp: float, pan: float) -> RangeBearing:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -9,13 +10,17 @@ from hypothesis import strategies as st
 from polepilot.core.landmark import LandmarkKind
 from polepilot.core.observation import Detection
 from polepilot.core.vehicle import Camera
+from polepilot.core.vision.kernel import Strip
 from polepilot.core.vision.measure import (
+    Pitch,
     bearing_of,
     column_of,
     depth_of,
-    half_width_of,
+    measure,
+    pitch_of,
     pixels_of,
     range_of,
+    stands,
     to_range_bearing,
 )
 
@@ -48,9 +53,45 @@ def test_columns_and_bearings_are_inverse(bearing: float) -> None:
     assert bearing_of(column_of(bearing, CAMERA), CAMERA) == pytest.approx(bearing, abs=1e-9)
 
 
-def test_width_of_a_far_cylinder() -> None:
-    half = half_width_of(8.0, 0.0, LandmarkKind(), CAMERA)
-    assert half == pytest.approx(600 * 0.035 / 8, rel=1e-4)
+def strip(kind: LandmarkKind, away: float, pitch: float, up: float = -0.075) -> Strip:
+    """A pole straight ahead whose middle is ``up`` above the lens, as a pitched camera sees it."""
+    depth = away - kind.axis_depth
+    rows = []
+    for k in range(kind.segments + 1):
+        height = up + kind.height / 2 - k * kind.segment
+        rise = math.tan(math.atan2(height, depth) - pitch)
+        rows.append(CAMERA.center_y - CAMERA.constant * rise)
+    places = np.arange(kind.segments + 1) - kind.segments / 2
+    # row = middle + unit * k / (1 + sag * k), linear in its three unknowns.
+    system = np.column_stack([np.ones_like(places), places, -np.multiply(rows, places)])
+    middle, slope, sag = np.linalg.lstsq(system, np.asarray(rows), rcond=None)[0]
+    return Strip(
+        id=1, bits=kind.bits, column=CAMERA.center_x, row=middle, unit=slope - middle * sag,
+        sag=sag, front=1.0, unit_sigma=1e-4, sag_sigma=1e-5, column_sigma=0.1,
+    )  # fmt: skip
+
+
+@settings(deadline=None)
+@given(st.floats(1.8, 20.0), st.floats(-0.035, 0.035), st.sampled_from((4, 8)))
+def test_a_camera_that_looks_up_or_down_measures_the_same_range(
+    away: float, pitch: float, bits: int
+) -> None:
+    kind = LandmarkKind(bits=bits)
+    seen = strip(kind, away, pitch, kind.height / 2 - CAMERA.mount_height)
+    one = measure(seen, kind, Pitch(pitch, 0.0), CAMERA)
+    assert one.range == pytest.approx(away, rel=1e-6)
+    assert stands(seen, kind, CAMERA)
+    found = pitch_of([(seen, kind)], CAMERA)
+    assert abs(found.angle - pitch) < 3 * found.sigma
+    one = measure(seen, kind, found, CAMERA)
+    assert abs(one.range - away) < 3 * one.range_sigma
+
+
+def test_nothing_stands_under_the_floor() -> None:
+    kind = LandmarkKind()
+    assert not stands(strip(kind, 15.0, 0.0, up=-2.0), kind, CAMERA)
+    assert not stands(strip(kind, 15.0, 0.0, up=5.0), kind, CAMERA)
+    assert stands(strip(kind, 3.0, 0.0, up=1.4), kind, CAMERA)
 
 
 @settings(deadline=None)

@@ -1,0 +1,208 @@
+"""The eye's kernel (native/*.c) as Python sees it: one call per picture, without the GIL.
+
+The library is built while Polepilot is installed (`python hatch_build.py --kernel` by hand).
+Everything here is in pixels and linear light; `measure` makes metres and radians of it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from polepilot.core.errors import InternalError
+from polepilot.core.landmark import LandmarkKind
+from polepilot.core.observation import Image
+
+VERSION = 1
+IDS = 256
+MOST_STRIPS = 40
+_LIBRARY = Path(__file__).with_name("_kernel.so")
+
+REASONS = (
+    "",
+    "no contrast",
+    "leans too far",
+    "no scale fits",
+    "the edges do not fit",
+    "bright segments have the wrong colour",
+    "dark segments are not dark",
+    "end bars differ",
+    "a segment looks like neither colour",
+    "no legal code",
+    "no landmark of this site",
+    "wrong width",
+    "cut off",
+    "something covers a part",
+)
+"""What `Strip.reason` means, in words; the first is a strip that was read."""
+
+
+class _Picture(ctypes.Structure):
+    _fields_ = [
+        ("pixels", ctypes.c_void_p),
+        ("rows", ctypes.c_int32),
+        ("columns", ctypes.c_int32),
+        ("channels", ctypes.c_int32),
+        ("stride", ctypes.c_ssize_t),
+    ]
+
+
+class _Kind(ctypes.Structure):
+    _fields_ = [
+        ("bits", ctypes.c_int32),
+        ("flat", ctypes.c_int32),
+        ("aspect", ctypes.c_double),
+        ("segment", ctypes.c_double),
+    ]
+
+
+class _Task(ctypes.Structure):
+    _fields_ = [
+        ("high", ctypes.c_int32),
+        ("low", ctypes.c_int32),
+        ("weights", ctypes.c_int32 * 3),
+        ("constant", ctypes.c_double),
+        ("kinds", _Kind * IDS),
+    ]
+
+
+class Strip(ctypes.Structure):
+    """A strip that was looked at closely; ``eye_strip`` of native/eye.h, pixels throughout."""
+
+    reason: int
+    """0: read; else `REASONS` says why not, and only id, code and place are meaningful."""
+    id: int
+    bits: int
+    sides: int
+    """2: both sides are in the picture; 1: one."""
+    column: float
+    row: float
+    """The strip's middle."""
+    unit: float
+    """Rows per segment there."""
+    sag: float
+    """By what share rows per segment shrink from segment to segment, going down."""
+    lean: float
+    """Columns per row, to the right going down."""
+    width: float
+    front: float
+    """Mean height of the surface that was measured, as a share of the radius."""
+    blur: float
+    noise: float
+    """What the fit of the edges leaves over, as a share of bright minus dark."""
+    side_noise: float
+    """What the fit across the strip leaves over, as a share of its peak."""
+    tint: float
+    """The paint's darkest channel over its brightest, black taken off."""
+    unit_sigma: float
+    """Standard deviation of ``unit`` as a share of it."""
+    sag_sigma: float
+    column_sigma: float
+    code: bytes
+
+    _fields_ = [
+        ("reason", ctypes.c_int32),
+        ("id", ctypes.c_int32),
+        ("bits", ctypes.c_int32),
+        ("sides", ctypes.c_int32),
+        ("column", ctypes.c_double),
+        ("row", ctypes.c_double),
+        ("unit", ctypes.c_double),
+        ("sag", ctypes.c_double),
+        ("lean", ctypes.c_double),
+        ("width", ctypes.c_double),
+        ("front", ctypes.c_double),
+        ("blur", ctypes.c_double),
+        ("noise", ctypes.c_double),
+        ("side_noise", ctypes.c_double),
+        ("tint", ctypes.c_double),
+        ("unit_sigma", ctypes.c_double),
+        ("sag_sigma", ctypes.c_double),
+        ("column_sigma", ctypes.c_double),
+        ("code", ctypes.c_char * 24),
+    ]
+
+
+class Kernel:
+    """Looks for one set of landmarks with one camera constant; keeps nothing between pictures.
+
+    Args:
+        kinds: the ids that exist (1 to 255) and what each looks like.
+        constant: camera constant, pixels.
+        channels: in which channels of a colour picture (0 blue, 1 green, 2 red) the bright paint
+            is brightest and darkest; None for the second: paint without colour.
+
+    Raises:
+        InternalError: the library is missing or belongs to another version.
+    """
+
+    def __init__(
+        self,
+        kinds: Mapping[int, LandmarkKind],
+        constant: float,
+        channels: tuple[int, int | None] = (2, 0),
+    ) -> None:
+        self._look = _library().eye_look
+        task = _Task(high=channels[0], low=-1 if channels[1] is None else channels[1])
+        task.weights[:] = (29, 150, 77)
+        task.constant = constant
+        for number, kind in kinds.items():
+            task.kinds[number] = _Kind(
+                kind.bits, kind.shape == "flat", kind.diameter / kind.segment, kind.segment
+            )
+        self._task = task
+        self._task_at = ctypes.byref(task)
+
+    def look(self, image: Image) -> list[Strip]:
+        """All strips of a picture (rows x columns x 3 BGR, or grey) that were worth a closer look,
+        read and rejected ones, the widest first.
+
+        Raises:
+            MemoryError: there is no memory for the search.
+        """
+        if image.strides[-1] != 1 or (image.ndim == 3 and image.strides[1] != image.shape[2]):
+            image = np.ascontiguousarray(image)
+        picture = _Picture(
+            image.ctypes.data,
+            image.shape[0],
+            image.shape[1],
+            image.shape[2] if image.ndim == 3 else 1,
+            image.strides[0],
+        )
+        strips = (Strip * MOST_STRIPS)()
+        count = self._look(ctypes.byref(picture), self._task_at, strips, MOST_STRIPS)
+        if count < 0:
+            raise MemoryError("no memory to look at a picture")
+        return strips[:count]
+
+
+def _library() -> ctypes.CDLL:
+    global _loaded
+    if _loaded is None:
+        try:
+            library = ctypes.CDLL(str(_LIBRARY))
+        except OSError as error:
+            raise InternalError(
+                f"the eye's kernel {_LIBRARY.name} cannot be loaded ({error}): "
+                "run `python hatch_build.py --kernel`, or install Polepilot anew."
+            ) from None
+        if library.eye_version() != VERSION:
+            raise InternalError(
+                f"the eye's kernel is of version {library.eye_version()}, expected {VERSION}: "
+                "run `python hatch_build.py --kernel`, or install Polepilot anew."
+            )
+        library.eye_look.restype = ctypes.c_int32
+        library.eye_look.argtypes = [
+            ctypes.c_void_p,
+            ctypes.c_void_p,
+            ctypes.c_void_p,
+            ctypes.c_int32,
+        ]
+        _loaded = library
+    return _loaded
+
+
+_loaded: ctypes.CDLL | None = None

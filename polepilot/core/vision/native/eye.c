@@ -1,0 +1,134 @@
+/* One look at a picture: search, straighten, fit, read, measure. */
+#include "eye.h"
+
+#include <math.h>
+#include <string.h>
+
+#define MOST_MISFIT 10.0
+#define USUAL_NOISE 0.035      /* rms rest of the fit of the edges, of bright - dark */
+#define USUAL_SIDE_NOISE 0.05  /* rms rest of the fit across, of its peak */
+#define USUAL_PITCH 0.035      /* radians between camera and pole */
+#define USUAL_TINT 0.15
+#define SHORTEST 1.25          /* rows per segment */
+
+int32_t eye_version(void) { return EYE_VERSION; }
+
+/* The thickest landmark with that many bits, in segments. */
+static double thickest(const eye_task *task, int bits)
+{
+    double most = 0;
+    for (int id = 1; id < EYE_IDS; id++)
+        if (task->kinds[id].bits == bits && task->kinds[id].aspect > most)
+            most = task->kinds[id].aspect;
+    return most;
+}
+
+/* Half of the columns between the silhouettes of a landmark whose segment covers ``unit`` rows. */
+static double half_width(const eye_task *task, const eye_kind *kind, double unit)
+{
+    double radius = kind->aspect * kind->segment / 2;
+    double depth = task->constant * kind->segment / unit;
+    if (kind->flat)
+        return task->constant * radius / depth;
+    double away = depth + radius;
+    return task->constant * radius / sqrt(away * away - radius * radius);
+}
+
+/* How badly everything together fits a landmark: squares of what the edges, the sides, the sag and
+ * the tint are off, each over what it usually is. Real strips seldom have more than a few. */
+static double misfit(const eye_strip *strip, double constant)
+{
+    double sag = hypot(strip->sag_sigma, USUAL_PITCH * strip->unit / constant);
+    double edges = strip->noise / USUAL_NOISE, sides = strip->side_noise / USUAL_SIDE_NOISE;
+    double tint = strip->tint > 0 ? strip->tint / USUAL_TINT : 0;
+    double bend = strip->sag / (1.2 * sag);
+    return edges * edges + sides * sides + bend * bend + tint * tint;
+}
+
+static int examine(const eye_picture *picture, const eye_task *task, eye_candidate *candidate,
+                   eye_strip *out)
+{
+    int segments = 2 * candidate->bits + 5, id = candidate->id;
+    char code[EYE_MOST_SEGMENTS + 3];
+    eye_upright upright;
+    eye_scale scale;
+    double levels[EYE_MOST_SEGMENTS][3];
+    out->bits = candidate->bits;
+    out->column = candidate->column;
+    out->row = (candidate->top + candidate->bottom) / 2;
+    out->unit = (candidate->bottom - candidate->top) / (segments - 4);
+    out->lean = candidate->lean;
+    out->width = thickest(task, candidate->bits) * out->unit;
+    eye_encode(id, candidate->bits, out->code);
+    /* A segment misread at whole pixels shows in the levels: fit again with what they say. */
+    for (int attempt = 0; attempt < 2; attempt++) {
+        eye_encode(id, candidate->bits, code);
+        double aspect = thickest(task, candidate->bits);
+        int reason = eye_straighten(picture, task, candidate, code, aspect, &upright);
+        if (reason != EYE_READ)
+            return reason;
+        out->column = upright.column;
+        out->lean = upright.lean;
+        reason = eye_fit_scale(&upright, task, code, candidate, &scale);
+        if (reason != EYE_READ)
+            return reason;
+        out->row = scale.middle;
+        out->unit = scale.unit;
+        out->width = thickest(task, candidate->bits) * scale.unit;
+        out->blur = scale.blur;
+        out->noise = scale.noise;
+        if (!eye_segment_levels(&upright, &scale, segments, levels))
+            return EYE_NO_SCALE;
+        double noise = scale.noise / sqrt(scale.unit > 1 ? scale.unit : 1);
+        reason = eye_read(task, levels, segments, picture->channels, noise, out->width,
+                          out->code, &out->tint);
+        if (reason != EYE_READ)
+            return reason;
+        int seen = eye_decode(out->code, segments);
+        if (seen == 0)
+            return EYE_NO_CODE;
+        if (seen == id)
+            break;
+        if (attempt == 1)
+            return EYE_NO_CODE;
+        id = seen;
+    }
+    out->id = id;
+    if (scale.unit < SHORTEST || scale.blur > (0.3 * scale.unit > 1 ? 0.3 * scale.unit : 1.5))
+        return EYE_POOR_FIT;
+    const eye_kind *kind = task->kinds + id;
+    if (kind->bits != candidate->bits)
+        return EYE_UNKNOWN_ID;
+    eye_side side;
+    int reason = eye_fit_side(picture, &upright, half_width(task, kind, scale.unit), kind->flat,
+                              &side);
+    if (reason != EYE_READ)
+        return reason;
+    out->side_noise = side.noise;
+    out->sides = side.sides;
+    out->column = side.column + upright.lean * (scale.middle - upright.row);
+    out->sag = scale.sag;
+    out->width = 2 * side.half;
+    out->front = side.front;
+    out->unit_sigma = scale.unit_sigma;
+    out->sag_sigma = scale.sag_sigma;
+    out->column_sigma = side.sigma;
+    return misfit(out, task->constant) > MOST_MISFIT ? EYE_POOR_FIT : EYE_READ;
+}
+
+int32_t eye_look(const eye_picture *picture, const eye_task *task, eye_strip *strips,
+                 int32_t capacity)
+{
+    eye_candidate candidates[EYE_MOST_CANDIDATES];
+    if (picture->rows < 8 || picture->columns < 1)
+        return 0;
+    int n = eye_search(picture, task, candidates);
+    if (n < 0)
+        return -1;
+    n = n > capacity ? capacity : n;
+    for (int i = 0; i < n; i++) {
+        memset(strips + i, 0, sizeof *strips);
+        strips[i].reason = examine(picture, task, candidates + i, strips + i);
+    }
+    return n;
+}

@@ -1,0 +1,80 @@
+/* From the light of the segments to the code, or to the reason why there is none.
+ *
+ * The end bars say what bright looks like here, the fences between the bits what dark looks like.
+ * Every segment must look like one of the two, in every channel; anything in between is no code. */
+#include "eye.h"
+
+#include <math.h>
+
+#define TOLERANCE 0.30     /* of the distance between bright and dark */
+#define MOST_TOLERANCE 0.45
+#define DARKEST_SHARE 0.45 /* of the bright paint's light that black gives back (haze, glare) */
+#define THIN_SHARE 0.35    /* as much more where the strip is hardly a pixel wide */
+#define LEAST_COLOUR 0.25  /* of the bright paint's light: its brightest channel minus its darkest */
+
+int eye_read(const eye_task *task, double levels[][3], int segments, int channels, double noise,
+             double width, char *code, double *tint)
+{
+    double first[3], last[3], dark[3] = {0}, mean[3];
+    double room = TOLERANCE + 2 * noise;
+    room = room > MOST_TOLERANCE ? MOST_TOLERANCE : room;
+    int fences = 0;
+    for (int i = 2; i < segments - 2; i += 2, fences++)
+        for (int c = 0; c < channels; c++)
+            dark[c] += levels[i][c];
+    double dimmest = 1e9, darkest = 0, differ = 0, powers = 0;
+    for (int c = 0; c < channels; c++) {
+        first[c] = (levels[0][c] + levels[1][c]) / 2;
+        last[c] = (levels[segments - 1][c] + levels[segments - 2][c]) / 2;
+        mean[c] = (first[c] + last[c]) / 2;
+        dark[c] /= fences;
+        differ += (first[c] - last[c]) * (first[c] - last[c]);
+        powers += (mean[c] - dark[c]) * (mean[c] - dark[c]);
+        if (dark[c] > darkest)
+            darkest = dark[c];
+    }
+    int reason = EYE_READ;
+    for (int i = 0; i < segments; i++) {
+        double place = i / (segments - 1.0), power = 0, along = 0, sum = 0, off = 0, top = 0;
+        double step[3];
+        for (int c = 0; c < channels; c++) {
+            /* Light may change along the pole: bright is interpolated between the end bars. */
+            double bright = first[c] * (1 - place) + last[c] * place;
+            step[c] = bright - dark[c];
+            power += step[c] * step[c];
+            along += (levels[i][c] - dark[c]) * step[c];
+            sum += step[c];
+            if (bright > top)
+                top = bright;
+        }
+        if (top < dimmest)
+            dimmest = top;
+        if (power <= 1e-7 || sum <= 0)
+            return EYE_NO_CONTRAST;
+        double share = along / power;
+        for (int c = 0; c < channels; c++) {
+            double aside = levels[i][c] - dark[c] - share * step[c];
+            off += aside * aside;
+        }
+        code[i] = share > 0.5 ? '1' : '0';
+        double nearest = share > 0.5 ? 1 : 0;
+        if (fabs(share - nearest) > room || sqrt(off / power) > room)
+            reason = EYE_NEITHER;
+    }
+    code[segments] = '\0';
+    *tint = 0;
+    if (channels == 3 && task->low >= 0) {
+        *tint = (mean[task->low] - dark[task->low]) / (mean[task->high] - dark[task->high]);
+        double high = mean[task->high], low = mean[task->low];
+        int other = 3 - task->high - task->low;
+        if (high - low < LEAST_COLOUR * high || mean[other] > 0.95 * high)
+            return EYE_WRONG_COLOUR;
+    }
+    /* A thin strip is blurred: what is beside it lightens its black. */
+    double thin = width < 4 ? (4 - width) / 3 : 0;
+    if (darkest > (DARKEST_SHARE + THIN_SHARE * (thin > 1 ? 1 : thin)) * dimmest)
+        return EYE_NOT_DARK;
+    if (sqrt(differ / powers) > 2 * room)
+        return EYE_ENDS_DIFFER;
+    return reason;
+}

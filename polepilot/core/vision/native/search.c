@@ -1,0 +1,552 @@
+/* Where landmarks may be: columns in which bright and dark runs have the proportions of a code.
+ *
+ * The inner part of a code, from the end of the upper end bar to the begin of the lower one, begins
+ * and ends dark and holds bright runs one segment long at odd places. It is looked for by itself:
+ * what the end bars touch may be as bright as they are. Columns that agree form one candidate. */
+#include "eye.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define BLOCK 32          /* columns that are looked at together */
+#define APART 2           /* every second column is looked at */
+#define MOST_RUNS 384     /* bright runs in one column */
+#define MOST_HITS 3000    /* columns with a code; a picture full of stripes has no landmark */
+#define MOST_GROUPS 400
+#define SHORTEST 1.15     /* rows per segment; shorter ones cannot be told apart */
+#define SLACK 0.28        /* share of a segment by which a run may miss its length or place */
+#define ROUNDING 0.75     /* rows by which it may miss besides */
+#define FRAYED 0.35       /* rows by which a bar may be shorter besides: its end has lost colour */
+#define HALF_LIGHT 0.70   /* half of the light as a share of the grey level, (1/2)^(1/2.2) = 0.73 */
+#define LEAVES_DARK 0.30  /* share of a step above which an edge has begun */
+#define SHORT_STRETCH 90  /* rows of colour, with gaps up to GAP, in which brightness is tried alone */
+#define MOST_REST 0.06f   /* mean square that a far code may leave over, of bright - dark */
+#define GAP 22
+#define BESIDE 4          /* rows above and below that take part */
+#define LEAST_STEP 8     /* grey levels; less is noise */
+#define SHALLOW 0.55      /* share of the peaks beside it above which a valley is texture or noise */
+#define SHOULDER 0.12     /* an edge has ended where it grows by less than this share */
+#define STEEP 0.065       /* columns per row of the slanting looks */
+
+typedef struct {
+    float start, end; /* rows, between pixels */
+    uint8_t peak;
+    uint8_t valley; /* the darkest between this run and the next */
+} run;
+
+typedef struct {
+    float column, top, bottom;
+    int16_t bits, id;
+    int8_t open_top, open_bottom, slant;
+} hit;
+
+typedef struct {
+    const eye_picture *picture;
+    const eye_task *task;
+    int n_bits, bits[4];
+    hit hits[MOST_HITS];
+    int n_hits;
+} search;
+
+/* The signal of every second column of a block, column by column. */
+static void fill(const search *s, int first, int count, const int *shift, uint8_t *signal,
+                 int rows_padded)
+{
+    const eye_picture *p = s->picture;
+    int n = p->channels, last = p->columns - 1;
+    for (int y = 0; y < p->rows; y++) {
+        const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
+        int x = first + shift[y];
+        uint8_t *to = signal + y;
+        for (int c = 0; c < count; c++, x += APART, to += rows_padded)
+            *to = (uint8_t)eye_signal(row + (x < 0 ? 0 : x > last ? last : x) * n, n, s->task);
+    }
+}
+
+/* The running sum of the brightness of three columns, grey levels of one. */
+static void fill_brightness(const search *s, int x, const int *shift, int from, int to, float *sum)
+{
+    const eye_picture *p = s->picture;
+    int n = p->channels, last = p->columns - 1;
+    sum[0] = 0;
+    for (int y = from; y < to; y++) {
+        const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
+        int total = 0;
+        for (int side = -1; side <= 1; side++) {
+            int at = x + shift[y] + side;
+            at = at < 0 ? 0 : at > last ? last : at;
+            total += eye_brightness(row + at * n, n, s->task);
+        }
+        sum[y - from + 1] = sum[y - from] + (float)total / 48;
+    }
+}
+
+/* Where a run's edge lies: from the dark row at ``from`` (level ``valley``) towards ``to``.
+ *
+ * The edge ends at a shoulder, not at the peak: behind a bar something brighter may go on. */
+static float edge(const uint8_t *s, int from, int to, int valley, int peak)
+{
+    int step = to > from ? 1 : -1, y = from;
+    int low = valley + (int)(LEAVES_DARK * (peak - valley));
+    while (y != to && s[y] <= low)
+        y += step;
+    int top = y;
+    while (top != to && s[top + step] - s[top] > SHOULDER * (s[top] - valley))
+        top += step;
+    float level = (float)valley + (float)HALF_LIGHT * (float)(s[top] - valley);
+    while (y != top && (float)s[y] < level)
+        y += step;
+    if (y == from)
+        return (float)y;
+    float here = s[y], before = s[y - step];
+    float part = here > before ? (here - level) / (here - before) : 0.0f;
+    if (part < 0.0f)
+        part = 0.0f;
+    if (part > 1.0f)
+        part = 1.0f;
+    return (float)y - (float)step * part;
+}
+
+/* The bright runs of one column, top first: the signal's ups and downs larger than a share of it. */
+static int find_runs(const uint8_t *s, int rows, run *runs)
+{
+    int count = 0, y = 0;
+    int valley = 0, valley_at = 0, before = 0; /* the last peak */
+    int peaks[MOST_RUNS], valleys[MOST_RUNS + 1], places[MOST_RUNS + 1];
+    while (count < MOST_RUNS) {
+        int rise = before / 8 > LEAST_STEP ? before / 8 : LEAST_STEP;
+        for (; y < rows; y++) { /* dark: wait for a rise */
+            if (s[y] == 0) {
+                uint64_t eight = 0;
+                while (y + 8 <= rows && (memcpy(&eight, s + y, 8), eight == 0))
+                    y += 8;
+                valley = 0;
+                if (y >= rows)
+                    break;
+                valley_at = y > 0 ? y - 1 : 0;
+            }
+            if (s[y] <= valley) {
+                valley = s[y];
+                valley_at = y;
+            } else if (s[y] - valley > rise) {
+                break;
+            }
+        }
+        valleys[count] = valley;
+        places[count] = valley_at;
+        if (y >= rows)
+            break;
+        int peak = s[y], peak_at = y;
+        for (; y < rows; y++) { /* bright: wait for a fall */
+            int fall = peak / 8 > LEAST_STEP ? peak / 8 : LEAST_STEP;
+            if (s[y] > peak) {
+                peak = s[y];
+                peak_at = y;
+            } else if (peak - s[y] > fall) {
+                break;
+            }
+        }
+        runs[count].peak = (uint8_t)peak;
+        peaks[count] = peak_at;
+        before = peak;
+        count++;
+        valley = y < rows ? s[y] : 0;
+        valley_at = y < rows ? y : rows - 1;
+        if (y >= rows) {
+            valleys[count] = 0;
+            places[count] = rows; /* the picture ends bright */
+            break;
+        }
+    }
+    if (count == MOST_RUNS)
+        return 0;
+    for (int i = 0; i < count; i++) {
+        int above = places[i], below = places[i + 1];
+        runs[i].valley = (uint8_t)valleys[i + 1];
+        /* A picture that begins bright has no dark row to start from. */
+        if (i == 0 && s[above] > LEAVES_DARK * runs[0].peak)
+            runs[i].start = -0.5f;
+        else
+            runs[i].start = edge(s, above, peaks[i], valleys[i], runs[i].peak);
+        runs[i].end = below >= rows ? (float)rows - 0.5f
+                                    : edge(s, below, peaks[i], valleys[i + 1], runs[i].peak);
+    }
+    return count;
+}
+
+/* The same runs with those joined that only a shallow valley parts; returns how many.
+ *
+ * Far fences are shallow valleys, and so are the noise and the texture of what is near: both
+ * readings of a column are looked at. */
+static int join_runs(const run *runs, int count, run *joined)
+{
+    int n = 0;
+    for (int i = 0; i < count; i++) {
+        if (n > 0) {
+            run *before = joined + n - 1;
+            int lower = before->peak < runs[i].peak ? before->peak : runs[i].peak;
+            if (before->valley > SHALLOW * lower) {
+                before->end = runs[i].end;
+                before->valley = runs[i].valley;
+                before->peak = before->peak > runs[i].peak ? before->peak : runs[i].peak;
+                continue;
+            }
+        }
+        joined[n++] = runs[i];
+    }
+    return n;
+}
+
+/* Every sequence of runs that looks like a code becomes a hit. */
+static int match(search *s, const run *runs, int count, float column, int slant)
+{
+    int found = 0, rows = s->picture->rows;
+    for (int b = 0; b < s->n_bits; b++) {
+        int bits = s->bits[b];
+        float inner = (float)(2 * bits + 1);
+        for (int i = 0; i + 2 < count; i++) {
+            for (int ones = 1; ones <= bits && i + ones + 1 < count; ones++) {
+                const run *upper = runs + i, *lower = runs + i + ones + 1;
+                float top = upper->end, unit = (lower->start - top) / inner;
+                if (unit < SHORTEST)
+                    continue;
+                float slack = (float)SLACK * unit + (float)ROUNDING;
+                float bar_slack = slack + (float)FRAYED;
+                float above = upper->end - upper->start, below = lower->end - lower->start;
+                /* A bar that the picture's edge cuts shows three quarters of itself at least. */
+                float least_above = (upper->start <= 0.0f ? 1.5f : 2.0f) * unit - bar_slack;
+                float least_below = (lower->end >= (float)(rows - 1) ? 1.5f : 2.0f) * unit - bar_slack;
+                if (above < least_above || below < least_below)
+                    continue;
+                int id = 0, last = -1, good = 1, dimmest = 255, brightest = 0;
+                for (int k = 0; k <= ones + 1; k++) {
+                    const run *one = upper + k;
+                    if (one->peak < dimmest)
+                        dimmest = one->peak;
+                    if (k <= ones && one->valley > brightest)
+                        brightest = one->valley;
+                    if (k == 0 || k == ones + 1)
+                        continue;
+                    float length = one->end - one->start;
+                    float middle = ((one->start + one->end) / 2 - top) / unit;
+                    int bit = (int)floorf((middle - 1.5f) / 2 + 0.5f);
+                    if (bit <= last || bit >= bits || fabsf(length - unit) > slack ||
+                        fabsf(middle - 1.5f - 2 * (float)bit) * unit > slack) {
+                        good = 0;
+                        break;
+                    }
+                    last = bit;
+                    id |= 1 << bit;
+                }
+                if (!good || brightest > 0.8 * dimmest || s->n_hits >= MOST_HITS)
+                    continue;
+                hit *h = s->hits + s->n_hits++;
+                h->column = column;
+                h->top = upper->end;
+                h->bottom = lower->start;
+                h->bits = (int16_t)bits;
+                h->id = (int16_t)id;
+                h->open_top = above > 2 * unit + slack || upper->start <= 0.0f;
+                h->open_bottom = below > 2 * unit + slack || lower->end >= (float)(rows - 1);
+                h->slant = (int8_t)slant;
+                found++;
+            }
+        }
+    }
+    return found;
+}
+
+/* Codes among the runs of one column, with and without those that only shallow valleys part. */
+static int match_near(search *s, const uint8_t *signal, int rows, run *runs, float column,
+                      int slant)
+{
+    int n = find_runs(signal, rows, runs);
+    if (n < 3)
+        return 0;
+    int hits = match(s, runs, n, column, slant);
+    int joined = join_runs(runs, n, runs + MOST_RUNS);
+    if (joined < n && joined >= 3)
+        hits += match(s, runs + MOST_RUNS, joined, column, slant);
+    return hits;
+}
+
+/* How badly the segments' light, read off its running sum, fits any code of that place and size:
+ * the mean square of what is left over, of bright - dark; ``id`` is what it reads. */
+static float comb(const float *sum, int rows, float top, float unit, int bits, int *id)
+{
+    int segments = 2 * bits + 5;
+    float level[EYE_MOST_SEGMENTS], before = 0;
+    for (int k = 0; k <= segments; k++) {
+        float place = top + unit * (float)k;
+        if (place < 0 || place >= (float)rows)
+            return 1e9f;
+        int at = (int)place;
+        float here = sum[at] + (place - (float)at) * (sum[at + 1] - sum[at]);
+        if (k > 0)
+            level[k - 1] = (here - before) / unit;
+        before = here;
+    }
+    float bright = (level[0] + level[1] + level[segments - 2] + level[segments - 1]) / 4;
+    float dark = 0;
+    for (int k = 2; k < segments - 2; k += 2)
+        dark += level[k];
+    dark /= (float)(bits + 1);
+    float step = bright - dark, rest = 0;
+    if (step < LEAST_STEP)
+        return 1e9f;
+    *id = 0;
+    for (int k = 0; k < segments; k++) {
+        int bit = k > 2 && k < segments - 2 && k % 2 == 1;
+        float off = level[k] - (k < 2 || k >= segments - 2 ? bright : dark);
+        if (bit && off > step / 2) {
+            /* A lone bright segment loses light to its neighbours: as bright as it gets. */
+            *id |= 1 << (k - 3) / 2;
+            off = off > 0.75f * step ? 0 : off - 0.75f * step;
+        }
+        rest += off * off;
+    }
+    return rest / (step * step * (float)segments);
+}
+
+/* Far codes: colour is too blurred there to part the segments, brightness is not. Where a column
+ * has colour for a short stretch, all places and sizes of a code are tried on its brightness. */
+static int match_far(search *s, const uint8_t *signal, int rows, int x, const int *shift,
+                     int slant)
+{
+    float sum[SHORT_STRETCH + 2 * BESIDE + 2];
+    int hits = 0, y = 0;
+    while (y < rows) {
+        uint64_t eight;
+        while (y + 8 <= rows && (memcpy(&eight, signal + y, 8), eight == 0))
+            y += 8;
+        while (y < rows && signal[y] < LEAST_STEP)
+            y++;
+        int from = y, last = y;
+        for (; y < rows && y - last <= GAP; y++)
+            if (signal[y] >= LEAST_STEP)
+                last = y;
+        int height = last - from + 1;
+        if (from >= rows || height > SHORT_STRETCH || height < 9 * SHORTEST)
+            continue;
+        int first = from < BESIDE ? 0 : from - BESIDE;
+        int end = last + BESIDE + 1 < rows ? last + BESIDE + 1 : rows;
+        fill_brightness(s, x, shift, first, end, sum);
+        for (int b = 0; b < s->n_bits; b++) {
+            int bits = s->bits[b], id = 0, best_id = 0;
+            float segments = (float)(2 * bits + 5), best = MOST_REST, best_top = 0, best_unit = 0;
+            float least = ((float)height - 8) / segments, most = ((float)height + 2) / segments;
+            float middle = (float)(from - first) + (float)height / 2;
+            least = least < (float)SHORTEST ? (float)SHORTEST : least;
+            for (float unit = least; unit <= most; unit += unit < 2 ? 0.04f : 0.02f * unit) {
+                float reach = 1.5f + 0.3f * unit;
+                for (float off = -reach; off <= reach; off += 0.5f) {
+                    float top = middle + off - unit * segments / 2;
+                    float rest = comb(sum, end - first, top, unit, bits, &id);
+                    if (rest < best) {
+                        best = rest;
+                        best_id = id;
+                        best_top = top;
+                        best_unit = unit;
+                    }
+                }
+            }
+            if (best_id == 0 || s->n_hits >= MOST_HITS)
+                continue;
+            float top = best_top + 2 * best_unit + (float)first - 0.5f;
+            s->hits[s->n_hits++] = (hit){.column = (float)x,
+                                         .top = top,
+                                         .bottom = top + (segments - 4) * best_unit,
+                                         .bits = (int16_t)bits,
+                                         .id = (int16_t)best_id,
+                                         .slant = (int8_t)slant};
+            hits++;
+        }
+    }
+    return hits;
+}
+
+/* Columns whose codes begin and end at the same height become one candidate. */
+typedef struct {
+    int first, last_hit, count;
+    float left, right, last_column;
+    int16_t bits;
+    int8_t slant;
+} group;
+
+static int by_column(const void *a, const void *b)
+{
+    const hit *x = a, *y = b;
+    if (x->slant != y->slant)
+        return x->slant - y->slant;
+    if (x->column != y->column)
+        return x->column < y->column ? -1 : 1;
+    return x->top < y->top ? -1 : x->top > y->top;
+}
+
+static int by_width(const void *a, const void *b)
+{
+    const eye_candidate *x = a, *y = b;
+    if (x->width != y->width)
+        return y->width - x->width;
+    return x->column < y->column ? -1 : x->column > y->column;
+}
+
+static int by_value(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return x < y ? -1 : x > y;
+}
+
+static int gather(search *s, eye_candidate *found)
+{
+    static const double lean_of[] = {-STEEP, 0.0, STEEP};
+    group *groups = malloc(sizeof *groups * MOST_GROUPS);
+    int *owner = malloc(sizeof *owner * (size_t)(s->n_hits + 1));
+    float *values = malloc(sizeof *values * (size_t)(2 * s->n_hits + 2));
+    eye_candidate *all = malloc(sizeof *all * MOST_GROUPS);
+    int n_groups = 0, n_found = 0;
+    if (!groups || !owner || !values || !all) {
+        n_found = -1;
+        goto done;
+    }
+    qsort(s->hits, (size_t)s->n_hits, sizeof *s->hits, by_column);
+    for (int i = 0; i < s->n_hits; i++) {
+        const hit *h = s->hits + i;
+        float room = 0.5f * (h->bottom - h->top) / (float)(2 * h->bits + 1) + 1.0f;
+        owner[i] = -1;
+        for (int g = n_groups - 1; g >= 0; g--) {
+            group *one = groups + g;
+            const hit *other = s->hits + one->last_hit;
+            if (one->bits == h->bits && one->slant == h->slant &&
+                h->column - one->last_column <= 2 * APART && fabsf(h->top - other->top) <= room &&
+                fabsf(h->bottom - other->bottom) <= room) {
+                one->last_hit = i;
+                one->last_column = one->right = h->column;
+                one->count++;
+                owner[i] = g;
+                break;
+            }
+        }
+        if (owner[i] < 0 && n_groups < MOST_GROUPS) {
+            groups[n_groups] = (group){i, i, 1, h->column, h->column, h->column, h->bits, h->slant};
+            owner[i] = n_groups++;
+        }
+    }
+    for (int g = 0; g < n_groups; g++) {
+        int votes[EYE_IDS] = {0};
+        int n = 0, open_top = 0, open_bottom = 0, best = 0;
+        for (int i = groups[g].first; i < s->n_hits; i++) {
+            if (owner[i] != g)
+                continue;
+            const hit *h = s->hits + i;
+            values[n] = h->top;
+            values[s->n_hits + n] = h->bottom;
+            n++;
+            open_top += h->open_top;
+            open_bottom += h->open_bottom;
+            if (++votes[h->id] > votes[best])
+                best = h->id;
+        }
+        qsort(values, (size_t)n, sizeof *values, by_value);
+        qsort(values + s->n_hits, (size_t)n, sizeof *values, by_value);
+        double lean = lean_of[groups[g].slant + 1];
+        double row = (values[n / 2] + values[s->n_hits + n / 2]) / 2;
+        all[g] = (eye_candidate){
+            .bits = groups[g].bits,
+            .id = best,
+            .column = (groups[g].left + groups[g].right) / 2 +
+                      lean * (row - (s->picture->rows - 1) / 2.0),
+            .lean = lean,
+            .top = values[n / 2],
+            .bottom = values[s->n_hits + n / 2],
+            .width = groups[g].count,
+            .open_top = 2 * open_top > n,
+            .open_bottom = 2 * open_bottom > n,
+        };
+    }
+    qsort(all, (size_t)n_groups, sizeof *all, by_width);
+    for (int g = 0; g < n_groups && n_found < EYE_MOST_CANDIDATES; g++) {
+        int known = 0;
+        for (int f = 0; f < n_found && !known; f++) {
+            const eye_candidate *other = found + f;
+            double room = 0.08 * (other->bottom - other->top) + 2.0;
+            known = all[g].bits == other->bits && all[g].id == other->id && fabs(all[g].top - other->top) < room &&
+                    fabs(all[g].bottom - other->bottom) < room &&
+                    fabs(all[g].column - other->column) < 2 * room;
+        }
+        if (!known)
+            found[n_found++] = all[g];
+    }
+done:
+    free(groups);
+    free(owner);
+    free(values);
+    free(all);
+    return n_found;
+}
+
+/* One look along columns that slant by ``slant`` * STEEP. ``wanted`` says, one flag per block, which
+ * blocks are looked at; a block that may hold more than was found is flagged again. */
+static void look(search *s, int slant, const uint8_t *wanted, uint8_t *again, uint8_t *signal,
+                 int rows_padded, int *shift, run *runs)
+{
+    int columns = s->picture->columns, rows = s->picture->rows;
+    for (int y = 0; y < rows; y++)
+        shift[y] = (int)lround(slant * STEEP * (y - (rows - 1) / 2.0));
+    for (int block = 0; block * BLOCK * APART < columns; block++) {
+        if (!wanted[block])
+            continue;
+        int first = block * BLOCK * APART;
+        int count = (columns - first + APART - 1) / APART;
+        count = count > BLOCK ? BLOCK : count;
+        fill(s, first, count, shift, signal, rows_padded);
+        int found = 0;
+        for (int c = 0; c < count; c++) {
+            const uint8_t *column = signal + c * rows_padded;
+            int x = first + APART * c;
+            int hits = match_near(s, column, rows, runs, (float)x, slant);
+            if (s->task->low >= 0 && s->picture->channels == 3)
+                hits += match_far(s, column, rows, x, shift, slant);
+            found += hits > 0;
+        }
+        again[block] = found == 0;
+    }
+}
+
+/* The candidates of a picture, the widest first; -1 where there is no memory. */
+int eye_search(const eye_picture *picture, const eye_task *task, eye_candidate *found)
+{
+    int rows_padded = (picture->rows + 15) / 16 * 16;
+    int blocks = picture->columns / (BLOCK * APART) + 1;
+    search *s = malloc(sizeof *s);
+    uint8_t *signal = malloc((size_t)rows_padded * BLOCK);
+    int *shift = malloc(sizeof *shift * (size_t)picture->rows);
+    run *runs = malloc(sizeof *runs * 2 * MOST_RUNS);
+    uint8_t *flags = malloc((size_t)blocks * 3);
+    int n = -1;
+    if (s && signal && shift && runs && flags) {
+        uint8_t *all = flags, *again = flags + blocks, *unused = flags + 2 * blocks;
+        s->picture = picture;
+        s->task = task;
+        s->n_hits = s->n_bits = 0;
+        for (int bits = 4; bits <= EYE_MOST_BITS; bits++)
+            for (int id = 1; id < EYE_IDS; id++)
+                if (task->kinds[id].bits == bits && s->n_bits < 4) {
+                    s->bits[s->n_bits++] = bits;
+                    break;
+                }
+        memset(all, 1, (size_t)blocks);
+        memset(again, 0, (size_t)blocks);
+        look(s, 0, all, again, signal, rows_padded, shift, runs);
+        look(s, -1, again, unused, signal, rows_padded, shift, runs);
+        look(s, 1, again, unused, signal, rows_padded, shift, runs);
+        n = gather(s, found);
+    }
+    free(s);
+    free(signal);
+    free(shift);
+    free(runs);
+    free(flags);
+    return n;
+}

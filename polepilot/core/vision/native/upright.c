@@ -1,0 +1,284 @@
+/* Set a strip upright: how it leans, its light by row along the lean, and by column across it.
+ *
+ * Rolling shutter and roll lean a strip over. The lean is the one under which the difference of
+ * bright and dark segments, averaged along the strip, stands out most: beside the strip it is about
+ * nothing, whatever colour is there. */
+#include "eye.h"
+
+#include <math.h>
+#include <string.h>
+
+#define MARGIN 1.3      /* segments above and below the code that are kept */
+#define STEEPEST 0.125  /* columns per row: 60 degrees/s, a slow shutter and 2 degrees of roll */
+#define ROWS_A_BAND 4
+#define COLUMNS_ACROSS 9.0 /* more columns than this across the strip are left out */
+#define LOOKED_AT 0.70  /* share of the half width over which the profile is averaged */
+#define LEAST_SIGNAL 4.0 /* grey levels of bright minus dark */
+#define ROWS_A_UNIT 6.0 /* more rows per segment than this are averaged */
+
+typedef struct {
+    double row;    /* middle */
+    double weight; /* in the difference of bright and dark */
+    float light[EYE_MOST_COLUMNS];  /* of the paint's colour, by column */
+    float signal[EYE_MOST_COLUMNS]; /* how bright the paint's colour is, no more than the paint */
+} band;
+
+static inline int clamp(int value, int low, int high)
+{
+    return value < low ? low : value > high ? high : value;
+}
+
+/* Linear light of the paint's colour: grey gives about nothing, whatever its pattern. */
+static inline float light_of(const uint8_t *pixel, int channels, const eye_task *task)
+{
+    if (channels == 1 || task->low < 0)
+        return eye_linear_sixteenths(eye_brightness(pixel, channels, task));
+    return eye_linear(pixel[task->high]) - eye_linear(pixel[task->low]);
+}
+
+/* Light and signal of one band by column: the mean of up to ROWS_A_BAND rows. */
+static void fill_band(const eye_picture *p, const eye_task *task, double from, double to,
+                      int first, int step, int columns, band *out)
+{
+    int top = (int)ceil(from), bottom = (int)floor(to);
+    if (bottom < top)
+        top = bottom = (int)lround((from + to) / 2);
+    top = clamp(top, 0, p->rows - 1);
+    bottom = clamp(bottom, 0, p->rows - 1);
+    int count = bottom - top + 1, used = count < ROWS_A_BAND ? count : ROWS_A_BAND;
+    double middle = 0;
+    memset(out->light, 0, sizeof *out->light * (size_t)columns);
+    memset(out->signal, 0, sizeof *out->signal * (size_t)columns);
+    for (int i = 0; i < used; i++) {
+        int y = top + (2 * i + 1) * count / (2 * used);
+        const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
+        middle += y;
+        for (int c = 0; c < columns; c++) {
+            int x = clamp(first + c * step, 0, p->columns - 1);
+            const uint8_t *pixel = row + x * p->channels;
+            out->light[c] += light_of(pixel, p->channels, task);
+            out->signal[c] += (float)eye_signal(pixel, p->channels, task);
+        }
+    }
+    for (int c = 0; c < columns; c++) {
+        out->light[c] /= (float)used;
+        out->signal[c] /= (float)used;
+    }
+    out->row = middle / used;
+}
+
+/* No signal is to be brighter than the paint: a wall of its colour beside the strip, or a white
+ * one seen without colour, would lend the difference more than the strip itself. */
+static void cap_signal(band *bands, int n, int columns, int at)
+{
+    float most = 0;
+    at = clamp(at, 1, columns - 2);
+    for (int b = 0; b < n; b++)
+        if (bands[b].weight > 0)
+            for (int c = at - 1; c <= at + 1; c++)
+                most = bands[b].signal[c] > most ? bands[b].signal[c] : most;
+    for (int b = 0; b < n; b++)
+        for (int c = 0; c < columns; c++)
+            if (bands[b].signal[c] > most)
+                bands[b].signal[c] = most;
+}
+
+/* Bright minus dark by column, each band moved back by ``lean``. */
+static void difference(const band *bands, int n, int columns, int step, double row, double lean,
+                       int light, float *out)
+{
+    memset(out, 0, sizeof *out * (size_t)columns);
+    for (int b = 0; b < n; b++) {
+        double shift = lean * (bands[b].row - row) / step;
+        int whole = (int)floor(shift);
+        float part = (float)(shift - whole), weight = (float)bands[b].weight;
+        float near = weight * (1 - part), far = weight * part;
+        const float *of = light ? bands[b].light : bands[b].signal;
+        for (int c = 0; c < columns; c++) {
+            int at = clamp(c + whole, 0, columns - 2);
+            out[c] += near * of[at] + far * of[at + 1];
+        }
+    }
+}
+
+static double energy(const float *values, int n)
+{
+    double sum = 0;
+    for (int i = 0; i < n; i++)
+        if (values[i] > 0)
+            sum += (double)values[i] * values[i];
+    return sum;
+}
+
+/* The lean near ``guess`` under which the difference stands out most. */
+static double find_lean(const band *bands, int n, int columns, int step, double row, double guess,
+                        double length, double wide)
+{
+    float values[EYE_MOST_COLUMNS];
+    double best = -1, best_lean = guess;
+    double apart = 0.4 * wide / length;
+    int reach = (int)ceil(STEEPEST / apart);
+    if (reach > 12)
+        reach = 12;
+    for (int i = -reach; i <= reach; i++) {
+        double lean = i * apart;
+        difference(bands, n, columns, step, row, lean, 0, values);
+        double e = energy(values, columns);
+        if (e > best) {
+            best = e;
+            best_lean = lean;
+        }
+    }
+    for (int round = 0; round < 2; round++) {
+        /* A parabola through three energies has its top at the best lean. */
+        double e[3];
+        for (int i = 0; i < 3; i++) {
+            difference(bands, n, columns, step, row, best_lean + (i - 1) * apart, 0, values);
+            e[i] = energy(values, columns);
+        }
+        double bend = e[0] - 2 * e[1] + e[2];
+        double move = bend < 0 ? 0.5 * (e[0] - e[2]) / bend : 0;
+        best_lean += apart * (move < -1 ? -1 : move > 1 ? 1 : move);
+        apart *= 0.4;
+    }
+    return best_lean;
+}
+
+/* Rows well inside every run of the code, as bands with the weights of bright - dark. */
+static int fill_bands(const eye_picture *p, const eye_task *task, const eye_candidate *c, const char *code,
+                      int segments, double unit, int first, int step, int columns, band *bands)
+{
+    double trim = 0.5 * unit - 0.52;
+    trim = trim < 0 ? 0 : trim > 0.2 * unit + 0.6 ? 0.2 * unit + 0.6 : trim;
+    int n = 0, ones = 0;
+    for (int i = 1; i < segments - 1;) {
+        int end = i;
+        while (end < segments - 1 && code[end] == code[i])
+            end++;
+        int bright = code[i] == '1', bar = i == 1 || end == segments - 1;
+        double from = c->top + (i - 2) * unit, to = c->top + (end - 2) * unit;
+        fill_band(p, task, from + trim, to - trim, first, step, columns, bands + n);
+        bands[n].weight = bright ? (bar ? 1 : 2) : -2;
+        ones += bright && !bar;
+        n++;
+        i = end;
+    }
+    for (int i = 0; i < n; i++)
+        bands[i].weight /= 2 * ones + 2;
+    return n;
+}
+
+/* How much of a column at ``offset`` from the strip's middle takes part in the profile. */
+static inline float share_of(double offset, double half)
+{
+    double inside = half + 0.5 - fabs(offset);
+    return (float)(inside < 0 ? 0 : inside > 1 ? 1 : inside);
+}
+
+static void fill_profile(const eye_picture *p, const eye_task *task, double top, double bottom, double unit,
+                         eye_upright *out)
+{
+    int bin = (int)(unit / ROWS_A_UNIT);
+    bin = bin < 1 ? 1 : bin;
+    int first = (int)floor(top - MARGIN * unit - 1), last = (int)ceil(bottom + MARGIN * unit + 1);
+    first = clamp(first, 0, p->rows - 1);
+    last = clamp(last, 0, p->rows - 1);
+    int rows = (last - first + 1) / bin;
+    rows = rows > EYE_MOST_ROWS ? EYE_MOST_ROWS : rows;
+    out->bin = bin;
+    out->rows = rows;
+    out->first = first - 0.5;
+    out->channels = p->channels;
+    double half = out->half_window;
+    int step = (int)(half / 4);
+    step = step < 1 ? 1 : step;
+    for (int r = 0; r < rows; r++) {
+        float light = 0, channel[3] = {0, 0, 0}, total = 0;
+        for (int i = 0; i < bin; i++) {
+            int y = first + r * bin + i;
+            const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
+            double middle = out->column + out->lean * (y - out->row);
+            int from = clamp((int)ceil(middle - half - 0.5), 0, p->columns - 1);
+            int to = clamp((int)floor(middle + half + 0.5), 0, p->columns - 1);
+            for (int x = from; x <= to; x += step) {
+                float share = share_of(x - middle, half);
+                const uint8_t *pixel = row + x * p->channels;
+                total += share;
+                /* Rec. 601 luma, as in JPEG, for most paints: the part that is kept sharp. A mixture
+                 * of black and one colour has a luma whose light is the mixture's share, so its
+                 * edges are not displaced. */
+                light += share *
+                         eye_linear_sixteenths(eye_brightness(pixel, p->channels, task));
+                for (int k = 0; k < p->channels; k++)
+                    channel[k] += share * eye_linear(pixel[k]);
+            }
+        }
+        float scale = total > 1e-6f ? 1 / total : 0;
+        out->light[r] = light * scale;
+        for (int k = 0; k < 3; k++)
+            out->channel[r][k] = channel[k] * scale;
+    }
+}
+
+/* Sets a candidate upright; the reason where that cannot be. ``aspect``: thickness in segments. */
+int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candidate *c,
+                   const char *code, double aspect, eye_upright *out)
+{
+    int segments = 2 * c->bits + 5;
+    double unit = (c->bottom - c->top) / (segments - 4), wide = aspect * unit;
+    double length = (segments - 2) * unit;
+    double reach = wide + 4 + 0.03 * length;
+    int step = (int)ceil((2 * reach + 1) / EYE_MOST_COLUMNS);
+    if (step < (int)(wide / COLUMNS_ACROSS))
+        step = (int)(wide / COLUMNS_ACROSS);
+    int first = (int)floor(c->column - reach);
+    int columns = (int)(2 * reach / step) + 2;
+    columns = columns > EYE_MOST_COLUMNS ? EYE_MOST_COLUMNS : columns;
+    band bands[2 * EYE_MOST_BITS + 4];
+    int n = fill_bands(p, task, c, code, segments, unit, first, step, columns, bands);
+    cap_signal(bands, n, columns, (int)lround((c->column - first) / step));
+    double row = (c->top + c->bottom) / 2;
+    double lean = find_lean(bands, n, columns, step, row, c->lean, length, wide > 2 ? wide : 2);
+    if (fabs(lean) > STEEPEST)
+        return EYE_LEANS;
+    difference(bands, n, columns, step, row, lean, 0, out->across);
+    for (int i = 0; i < columns; i++)
+        if (first + i * step < 0 || first + i * step >= p->columns)
+            out->across[i] = 0; /* beyond the picture */
+    /* The strip is where a window of its width holds most. */
+    double best = 0, at = c->column;
+    int window = (int)lround(wide / step);
+    window = window < 1 ? 1 : window;
+    for (int i = 0; i + window <= columns; i++) {
+        double sum = 0;
+        for (int k = 0; k < window; k++)
+            sum += out->across[i + k];
+        if (sum > best) {
+            best = sum;
+            at = first + (i + (window - 1) / 2.0) * step;
+        }
+    }
+    /* Then the centre of mass within a little more. */
+    double mass = 0, moment = 0;
+    for (int i = 0; i < columns; i++) {
+        double x = first + i * step;
+        if (fabs(x - at) <= wide / 2 + step + 0.5 && out->across[i] > 0) {
+            mass += out->across[i];
+            moment += out->across[i] * x;
+        }
+    }
+    if (mass <= 0 || best / window < LEAST_SIGNAL)
+        return EYE_NO_CONTRAST;
+    difference(bands, n, columns, step, row, lean, 1, out->across);
+    out->column = moment / mass;
+    out->row = row;
+    out->lean = lean;
+    out->columns = columns;
+    out->step = step;
+    out->across_first = first;
+    out->half_window = LOOKED_AT * wide / 2;
+    if (out->half_window < 0.6)
+        out->half_window = 0.6;
+    fill_profile(p, task, c->top - 2 * unit, c->bottom + 2 * unit, unit, out);
+    return EYE_READ;
+}

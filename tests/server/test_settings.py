@@ -143,6 +143,16 @@ def test_values_reach_the_core() -> None:
             'camera.source is "simulated": expected a real camera, because link.board is "serial"',
         ),
         ("[camera]\nsource = 0", 'camera.source is 0: expected "simulated", as long as link.board'),
+        (
+            '[camera]\nsource = "rtsp://robin:secret@cam/live"',
+            'camera.source is "rtsp://...@cam/live": expected "simulated", as long as link.board',
+        ),
+        ('[camera]\nsource = ["a:secret@b"]', 'camera.source is ["...@b"]: expected a whole'),
+        (
+            "[camera]\nautofocus = true\nfocus = 9",
+            "camera.focus is 9: expected -1, because camera.",
+        ),
+        ("[camera]\nlatency_s = -1", "camera.latency_s is -1: expected a number from -0.1 to 5"),
         ("[camera]\nwidth = ", "line 2, at the end: this is no TOML: Invalid value."),
         ("[camera\n", "line 1, column 8: this is no TOML"),
         ("[camera]\nwidth = 400\nwidth = 500\n", "this is no TOML: Cannot overwrite a value."),

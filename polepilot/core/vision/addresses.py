@@ -209,7 +209,7 @@ def _explain_answer(failed: str, answer: str) -> CameraError:
     elif number:
         reason = "what it sends is no video that can be read."
     else:
-        reason = "the line is open, but nothing comes."
+        reason = "it can be reached, but sends no pictures."
     return CameraError(
         f"{failed} {reason}",
         remedy="Check the address, and that the camera is not streaming to somebody else.",

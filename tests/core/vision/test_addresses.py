@@ -201,8 +201,8 @@ def test_close_does_not_wait_for_a_camera_that_never_answers() -> None:
         (b"HTTP/1.0 404 Not Found\r\n\r\n", "camera_missing", "has no such path"),
         (b"HTTP/1.0 503 Busy\r\n\r\n", "camera_missing", "answers with status 503"),
         (b"HTTP/1.0 200 OK\r\nContent-Type: text/html\r\n\r\n<p>Hello", "camera_missing", "no vid"),
-        (b"\x00\xff\x17 what is this\r\n", "camera_silent", "nothing comes"),
-        (b"", "camera_silent", "the line is open, but nothing comes"),
+        (b"\x00\xff\x17 what is this\r\n", "camera_silent", "sends no pictures"),
+        (b"", "camera_silent", "can be reached, but sends no pictures"),
     ],
 )
 @pytest.mark.parametrize("scheme", ["http", "rtsp"])

@@ -51,7 +51,7 @@ def detect(
     if annotate is not None and len(files) != 1:
         raise InputError(f"--annotate draws one picture: got {len(files)}.")
     axis = None if center is None else parse_center(center)
-    kinds = _kinds(ids, bits, segment, diameter, shape)
+    kinds = kinds_of(ids, bits, segment, diameter, shape)
     images: list[Image] = []
     problems = []
     for file in files:
@@ -92,9 +92,14 @@ def parse_center(text: str) -> tuple[float, float]:
     return x, y
 
 
-def _kinds(
+def kinds_of(
     ids: str | None, bits: int, segment: float, diameter: float, shape: str
 ) -> dict[int, LandmarkKind]:
+    """The landmarks that the options describe, by id.
+
+    Raises:
+        InputError: there are no such landmarks; names the option.
+    """
     from polepilot.core.landmark import LandmarkKind
 
     if shape not in ("cylinder", "flat"):

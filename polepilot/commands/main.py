@@ -17,7 +17,7 @@ os.environ.setdefault("OPENCV_FOR_THREADS_NUM", "1")
 import typer
 from typer.exceptions import TyperException
 
-from polepilot.commands import bench, landmarks
+from polepilot.commands import bench, calibrate, landmarks
 from polepilot.commands.detect import detect
 from polepilot.commands.plan import plan
 from polepilot.commands.replay import replay
@@ -35,6 +35,7 @@ app = typer.Typer(
 for _command in (serve, detect, plan, simulate, replay):
     app.command()(_command)
 app.add_typer(landmarks.app, name="landmarks", help="Print landmarks to scale, choose their ids.")
+app.add_typer(calibrate.app, name="calibrate", help="Camera constant, lens, pan unit.")
 app.add_typer(bench.app, name="bench", help="Measure how fast and how well parts work.")
 
 

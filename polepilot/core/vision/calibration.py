@@ -280,10 +280,12 @@ def _solve(samples: Sequence[KnownRange], sigma: Array) -> tuple[float, float]:
     own = np.array([s.own_constant for s in samples])
     pull = np.array([s.slope_at(c) for s, c in zip(samples, own, strict=True)]) / sigma
     constant, scale = _weighted_median(own, pull), 1.0
+    if len(samples) > 2:
+        # From the median, once: measured around a mean that an outlier draws, it would grow.
+        scaled = _errors(samples, constant) / sigma
+        scale = max(1.0, 1.4826 * float(np.median(np.abs(scaled))))
     for _ in range(_ROUNDS):
         scaled = _errors(samples, constant) / sigma
-        if len(samples) > 2:
-            scale = max(1.0, 1.4826 * float(np.median(np.abs(scaled))))
         pull = _slopes(samples, constant) / sigma
         weight = np.minimum(1.0, _HUBER * scale / np.maximum(np.abs(scaled), 1e-12))
         step = float((weight * pull) @ scaled / ((weight * pull) @ pull))

@@ -113,6 +113,21 @@ def test_one_picture_that_disagrees_is_named_and_left_out() -> None:
     assert "one picture disagrees: 4m.png by 9.1 % (40.0 cm too near)" in verdict.reason
 
 
+@pytest.mark.parametrize("wrong", [0, 1, 2])
+@pytest.mark.parametrize("factor", [0.5, 0.93, 1.03, 1.2, 10.0])
+def test_one_of_three_is_found_too(wrong: int, factor: float) -> None:
+    noise = (1.001, 0.9995, 1.0005)
+    said = [d * (factor if n == wrong else 1.0) for n, d in enumerate((2.5, 4.0, 6.0))]
+    samples = [
+        seen(d, stretch=stretch, said=given)
+        for d, stretch, given in zip((2.5, 4.0, 6.0), noise, said, strict=True)
+    ]
+    answer = fit(*samples)
+    assert answer.constant == pytest.approx(TRUE, rel=0.002)
+    assert [r.agrees for r in answer.residuals] == [n != wrong for n in range(3)]
+    assert judge(answer).grade == "fair"
+
+
 def test_two_pictures_that_contradict_each_other() -> None:
     answer = fit(seen(3.0), seen(3.1, said=3.5))
     assert answer.outliers == ()

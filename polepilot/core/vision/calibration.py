@@ -43,6 +43,8 @@ _APART = 1.2
 """Distances whose ratio is less count as one."""
 _GOOD, _FAIR = 0.005, 0.015
 """Largest residual, as a share of the distance."""
+_EXCUSE = 3.0
+"""Sigmas by which an unsharp picture may be off."""
 _ROUNDS = 60
 
 Array = NDArray[np.float64]
@@ -122,6 +124,16 @@ class Residual:
         """The error as a share of the given distance."""
         return self.error / self.sample.distance
 
+    @property
+    def unsharp(self) -> bool:
+        """Whether the picture says little about its distance."""
+        return self.sigma > _GOOD * self.sample.distance
+
+    @property
+    def excused(self) -> bool:
+        """Whether the error is what was to be expected of an unsharp picture."""
+        return self.unsharp and abs(self.error) < _EXCUSE * self.sigma
+
 
 @dataclass(frozen=True, slots=True)
 class ConstantFit:
@@ -135,8 +147,12 @@ class ConstantFit:
 
     @property
     def worst(self) -> float:
-        """Largest residual of those that agree, as a share of the distance."""
-        return max(abs(r.share) for r in self.residuals if r.agrees)
+        """Largest residual of those that agree, as a share of the distance.
+
+        A picture that is unsharp, and off by no more than it says itself, does not count.
+        """
+        counting = [r for r in self.residuals if r.agrees and not r.excused]
+        return max(abs(r.share) for r in counting or self.residuals if r.agrees)
 
     @property
     def outliers(self) -> tuple[Residual, ...]:
@@ -200,6 +216,11 @@ def _notes(fit: ConstantFit) -> Iterator[str]:
         )
     elif fit.outliers or fit.worst > _FAIR:
         yield "A distance may be wrong, or a landmark of another size than was said."
+    if vague := [residual for residual in fit.residuals if residual.unsharp and residual.agrees]:
+        named = ", ".join(
+            f"{r.sample.name} (to {r.sigma / r.sample.distance * 100:.1f} %)" for r in vague
+        )
+        yield f"Says little about its distance: {named}. Go nearer, hold still, add light."
     if not several_distances([residual.sample for residual in fit.residuals]):
         yield (
             "Only one distance: an error in it goes straight into the constant; take a second, at "

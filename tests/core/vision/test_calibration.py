@@ -128,6 +128,20 @@ def test_one_of_three_is_found_too(wrong: int, factor: float) -> None:
     assert judge(answer).grade == "fair"
 
 
+def test_an_unsharp_picture_does_not_spoil_the_others() -> None:
+    vague = seen(7.0, stretch=1.015)
+    vague = replace(vague, detection=replace(vague.detection, range_sigma=0.06))
+    answer = fit(seen(2.5), seen(4.0), vague)
+    assert answer.constant == pytest.approx(TRUE, rel=0.001)
+    assert answer.worst < 0.001
+    verdict = judge(answer)
+    assert verdict.grade == "good"
+    assert "7m.png (to 0.9 %)" in verdict.notes[0]
+    # Sharper, the same error would be one.
+    vague = replace(vague, detection=replace(vague.detection, range_sigma=0.015))
+    assert judge(fit(seen(2.5), seen(4.0), vague)).grade == "fair"
+
+
 def test_two_pictures_that_contradict_each_other() -> None:
     answer = fit(seen(3.0), seen(3.1, said=3.5))
     assert answer.outliers == ()

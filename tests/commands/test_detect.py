@@ -1,4 +1,4 @@
-"""The `detect` and `bench vision` contracts of the command line."""
+"""The `detect` contract of the command line."""
 
 from __future__ import annotations
 
@@ -156,14 +156,3 @@ def test_annotate(near: str, tmp_path: Path) -> None:
     drawn = cv2.imread(str(out))
     assert drawn is not None
     assert ((drawn[:, :, 1] > 200) & (drawn[:, :, 0] < 120) & (drawn[:, :, 2] < 120)).any()
-
-
-def test_bench_vision(near: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["bench", "vision", "--frames", str(Path(near).parent), "--json"]) == 0
-    result = json.loads(capsys.readouterr().out)
-    assert result["frames"] == 1
-    assert result["source"] == str(Path(near).parent)
-    assert result["ratio"] == pytest.approx(result["ours_ms"] / result["aruco_ms"])
-    (tmp_path / "none").mkdir()
-    assert run(["bench", "vision", "--frames", str(tmp_path / "none")]) == 2
-    assert "no picture" in capsys.readouterr().err

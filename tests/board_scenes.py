@@ -30,6 +30,7 @@ def board_picture(
     *,
     camera: Camera = CAMERA,
     board: Board = BOARD,
+    noise: float = 2.0,
 ) -> Image:
     """The board's middle ``away`` metres along the ray through ``aim`` (share of the picture).
 
@@ -59,8 +60,8 @@ def board_picture(
         borderValue=(110,),
     )
     small = cv2.resize(shown, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
-    noise = np.random.default_rng(seed).normal(0, 2, small.shape)
-    return np.clip(20 + 0.8 * small + noise, 0, 255).astype(np.uint8)
+    grain = noise * np.random.default_rng(seed).normal(0, 1, small.shape)
+    return np.clip(20 + 0.8 * small + grain, 0, 255).astype(np.uint8)
 
 
 def _matrix(camera: Camera) -> NDArray[np.float64]:

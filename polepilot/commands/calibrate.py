@@ -116,7 +116,7 @@ def pan(
         typer.Option(
             metavar="COUNTS=DEGREES",
             help="What the converter says while the camera looks into a known direction, left "
-            "positive; two or more.",
+            "positive; two or more. 0.78rad=45: what the program says, in radians.",
         ),
     ] = None,
     dataset: Annotated[

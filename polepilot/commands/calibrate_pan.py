@@ -34,10 +34,10 @@ _LARGEST_GAP = 0.5
 
 
 def calibrate_directions(texts: Sequence[str], unit: PanUnit) -> Outcome:
-    """From directions that a person knows: ``ADC=DEGREES``, left positive."""
+    """From directions that a person knows: ``COUNTS=DEGREES``, left positive."""
     from polepilot.core.localization.pan_line import fit_line, judge
 
-    fit = fit_line([_direction(text) for text in texts], unit)
+    fit = fit_line([_direction(text, unit) for text in texts], unit)
     rows = [
         (
             f"{one.adc:g}",
@@ -229,14 +229,17 @@ def parse_degrees(text: str, option: str) -> float:
     return math.radians(value)
 
 
-def _direction(text: str) -> KnownDirection:
-    from polepilot.core.localization.pan_line import KnownDirection
+def _direction(text: str, unit: PanUnit) -> KnownDirection:
+    """``512=0``: counts; ``0.78rad=45``: the angle as it is read with the present calibration."""
+    from polepilot.core.localization.pan_line import KnownDirection, PanLine
 
-    adc, equals, degrees = text.partition("=")
+    said, equals, degrees = text.partition("=")
     try:
-        count = float(adc)
+        count = float(said.removesuffix("rad"))
     except ValueError:
         count = math.nan
+    if said.endswith("rad") and math.isfinite(count):
+        count = PanLine.of(unit).adc(count)
     if not equals or not math.isfinite(count):
         raise InputError(f"--at is {text!r}: expected COUNTS=DEGREES, left positive, as 512=0.")
     try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,7 +22,7 @@ RED: Colour = (60, 60, 255)
 _TILE = 800
 """About how many columns a picture is drawn with."""
 _MOST_ACROSS = 3
-_BAND = 24
+_BAND = 34
 """Height of a line of words below the picture, pixels."""
 
 
@@ -48,7 +47,7 @@ class Tile:
 
     def spot(self, place: tuple[float, float], colour: Colour) -> None:
         """A small circle."""
-        cv2.circle(self._canvas, self._at(place), 4, colour, 1, cv2.LINE_AA)
+        cv2.circle(self._canvas, self._at(place), 7, colour, 2, cv2.LINE_AA)
 
     def say(self, words: str, colour: Colour = (230, 230, 230)) -> None:
         """A line below the picture; letters of the plain alphabet only."""
@@ -58,8 +57,8 @@ class Tile:
         """The picture with the lines below it."""
         band = np.full((_BAND * len(self._words), self._canvas.shape[1], 3), 32, np.uint8)
         for number, (words, colour) in enumerate(self._words):
-            place = (6, _BAND * number + 17)
-            cv2.putText(band, words, place, cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv2.LINE_AA)
+            place = (6, _BAND * number + 25)
+            cv2.putText(band, words, place, cv2.FONT_HERSHEY_SIMPLEX, 0.75, colour, 1, cv2.LINE_AA)
         return np.vstack([self._canvas, band])
 
     def _at(self, place: tuple[float, float]) -> tuple[int, int]:
@@ -73,7 +72,7 @@ def write_sheet(tiles: Sequence[Tile], out: Path, option: str = "--annotate") ->
         InputError: ``out`` cannot be written.
     """
     pictures = [tile.done() for tile in tiles]
-    across = min(math.ceil(math.sqrt(len(pictures))), _MOST_ACROSS)
+    across = min(len(pictures), _MOST_ACROSS)
     width = max(picture.shape[1] for picture in pictures)
     height = max(picture.shape[0] for picture in pictures)
     down = -(-len(pictures) // across)

@@ -141,11 +141,11 @@ def judge(fit: LineFit) -> Verdict:
     notes = tuple(_notes(fit))
     largest = max(abs(value) for value in fit.residuals)
     ends = max(fit.sigma_at)
-    if len(fit.directions) == 2:
-        reason = "two directions always make a line; a third would show a mistake."
-        return Verdict("fair" if ends <= 2 * _FAIR else "poor", reason, notes)
     within = f"all directions lie within {math.degrees(largest):.2f}° of a line"
     sure = f"the ends of the range are known to {math.degrees(ends):.2f}°"
+    if len(fit.directions) == 2 and ends <= _FAIR:
+        reason = f"two directions always make a line, a third would show a mistake; {sure}."
+        return Verdict("fair", reason, notes)
     if largest <= _GOOD and ends <= _GOOD:
         return Verdict("good", f"{within}; {sure}.", notes)
     if largest <= _FAIR and ends <= _FAIR:
@@ -172,7 +172,7 @@ def _notes(fit: LineFit) -> Iterator[str]:
             f"The directions span {math.degrees(span):.0f}° only: some near both ends of the range "
             "make the line surer."
         )
-    if fit.bow is not None and blunder is None and fit.bow > DIRECTION_SIGMA:
+    if fit.bow is not None and blunder is None and fit.bow > _GOOD:
         yield (
             f"The potentiometer is bent: {math.degrees(fit.bow):.1f}° off the line "
             f"({fit.bow / span * 100:.1f} % of the span). The localizer learns this by itself."

@@ -178,6 +178,12 @@ def _notes(survey: PanSurvey) -> Iterator[str]:
                 f"Landmark {check.landmark} was left out: {check.range_error * 100:+.0f} cm and "
                 f"{math.degrees(check.bearing_error):+.1f}° off. Has it been moved?"
             )
+    doubt = math.degrees(survey.scale_sigma * survey.half_range)
+    if abs(survey.scale - 1) < 3 * survey.scale_sigma:
+        yield (
+            "The scale so far is not shown to be wrong: the correction is no larger than what is "
+            f"uncertain here ({doubt:.1f}° at the ends). Landmarks all around would tell more."
+        )
     if survey.offset is None:
         yield (
             "What counts as straight ahead was kept: from one place it cannot be told from the "

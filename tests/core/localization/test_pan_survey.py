@@ -103,6 +103,12 @@ def test_everything_at_once() -> None:
         assert line.angle(adc) == pytest.approx(answer.offset + 0.96 * read, abs=0.005)
 
 
+def test_a_good_calibration_is_said_to_be_one() -> None:
+    right, wrong = (judge(solve(sweep(scale=scale), STANDS.heading)) for scale in (1.0, 1.03))
+    assert any("not shown to be wrong" in note for note in right.notes)
+    assert not any("not shown to be wrong" in note for note in wrong.notes)
+
+
 def test_without_a_heading_straight_ahead_is_kept() -> None:
     answer = solve(sweep(scale=1.03, offset=0.1))
     assert answer.offset is None

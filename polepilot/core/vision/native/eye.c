@@ -4,11 +4,13 @@
 #include <math.h>
 #include <string.h>
 
-#define MOST_MISFIT 10.0
+#define MOST_MISFIT 7.0         /* with one bit set, */
+#define MISFIT_A_BIT 1.5        /* and more for every further one: the more there is to fit */
 #define USUAL_NOISE 0.035      /* rms rest of the fit of the edges, of bright - dark */
-#define USUAL_SIDE_NOISE 0.05  /* rms rest of the fit across, of its peak */
+#define USUAL_SIDE_NOISE 0.06  /* rms rest of the fit across, of its peak */
 #define USUAL_PITCH 0.035      /* radians between camera and pole */
-#define USUAL_TINT 0.15
+#define USUAL_TINT 0.12
+#define MOST_BLUR 0.5          /* rows, and three tenths of a segment */
 #define SHORTEST 1.25          /* rows per segment */
 
 int32_t eye_version(void) { return EYE_VERSION; }
@@ -41,7 +43,7 @@ static double misfit(const eye_strip *strip, double constant)
     double sag = hypot(strip->sag_sigma, USUAL_PITCH * strip->unit / constant);
     double edges = strip->noise / USUAL_NOISE, sides = strip->side_noise / USUAL_SIDE_NOISE;
     double tint = strip->tint > 0 ? strip->tint / USUAL_TINT : 0;
-    double bend = strip->sag / (1.2 * sag);
+    double bend = strip->sag / (1.5 * sag);
     return edges * edges + sides * sides + bend * bend + tint * tint;
 }
 
@@ -94,7 +96,7 @@ static int examine(const eye_picture *picture, const eye_task *task, eye_candida
         id = seen;
     }
     out->id = id;
-    if (scale.unit < SHORTEST || scale.blur > (0.3 * scale.unit > 1 ? 0.3 * scale.unit : 1.5))
+    if (scale.unit < SHORTEST || scale.blur > MOST_BLUR + 0.3 * scale.unit)
         return EYE_POOR_FIT;
     const eye_kind *kind = task->kinds + id;
     if (kind->bits != candidate->bits)
@@ -104,6 +106,8 @@ static int examine(const eye_picture *picture, const eye_task *task, eye_candida
                               &side);
     if (reason != EYE_READ)
         return reason;
+    if (eye_covered(picture, &upright, &scale, &side, out->code, levels, segments, scale.noise / 2))
+        return EYE_COVERED;
     out->side_noise = side.noise;
     out->sides = side.sides;
     out->column = side.column + upright.lean * (scale.middle - upright.row);
@@ -113,7 +117,10 @@ static int examine(const eye_picture *picture, const eye_task *task, eye_candida
     out->unit_sigma = scale.unit_sigma;
     out->sag_sigma = scale.sag_sigma;
     out->column_sigma = side.sigma;
-    return misfit(out, task->constant) > MOST_MISFIT ? EYE_POOR_FIT : EYE_READ;
+    double most = MOST_MISFIT - MISFIT_A_BIT;
+    for (int bit = 0; bit < candidate->bits; bit++)
+        most += id >> bit & 1 ? MISFIT_A_BIT : 0;
+    return misfit(out, task->constant) > most ? EYE_POOR_FIT : EYE_READ;
 }
 
 int32_t eye_look(const eye_picture *picture, const eye_task *task, eye_strip *strips,

@@ -6,6 +6,7 @@
  *   scale.c    all edges of the code at once, fitted to one scale
  *   read.c     the light of the segments as bits, or why they are none
  *   side.c     where the strip's middle lies between its sides
+ *   cover.c    whether something dark lies over it
  * Rows and columns count from the centre of the first pixel. Light is linear, 0 to 1.
  * docs/vision.md explains the method. */
 #ifndef POLEPILOT_EYE_H
@@ -95,7 +96,7 @@ typedef struct {
     int bits, id;
     double column, lean;
     double top, bottom; /* the boundaries inside the end bars: after segment 2, before N - 2 */
-    int width;          /* columns that agreed */
+    int evidence;       /* contrast, summed up over the columns that agreed */
     int open_top, open_bottom; /* something bright goes on beyond the end bar */
 } eye_candidate;
 
@@ -146,6 +147,10 @@ int eye_read(const eye_task *task, double levels[][3], int segments, int channel
              double width, char *code, double *tint);
 int eye_fit_side(const eye_picture *picture, const eye_upright *upright, double half,
                  int flat, eye_side *out);
+
+int eye_covered(const eye_picture *picture, const eye_upright *upright, const eye_scale *scale,
+                const eye_side *side, const char *code, double levels[][3], int segments,
+                double noise);
 
 /* algebra.c */
 double eye_cumulative(double z);

@@ -7,6 +7,7 @@
 #include <math.h>
 
 #define TOLERANCE 0.30     /* of the distance between bright and dark */
+#define DARK_TOLERANCE 0.18
 #define MOST_TOLERANCE 0.45
 #define DARKEST_SHARE 0.45 /* of the bright paint's light that black gives back (haze, glare) */
 #define THIN_SHARE 0.35    /* as much more where the strip is hardly a pixel wide */
@@ -18,6 +19,7 @@ int eye_read(const eye_task *task, double levels[][3], int segments, int channel
     double first[3], last[3], dark[3] = {0}, mean[3];
     double room = TOLERANCE + 2 * noise;
     room = room > MOST_TOLERANCE ? MOST_TOLERANCE : room;
+    double dark_room = DARK_TOLERANCE + 2 * noise;
     int fences = 0;
     for (int i = 2; i < segments - 2; i += 2, fences++)
         for (int c = 0; c < channels; c++)
@@ -57,8 +59,9 @@ int eye_read(const eye_task *task, double levels[][3], int segments, int channel
             off += aside * aside;
         }
         code[i] = share > 0.5 ? '1' : '0';
-        double nearest = share > 0.5 ? 1 : 0;
-        if (fabs(share - nearest) > room || sqrt(off / power) > room)
+        /* Black is black everywhere on a pole; bright paint has shade and gloss. */
+        double nearest = share > 0.5 ? 1 : 0, least = nearest > 0 ? room : dark_room;
+        if (fabs(share - nearest) > least || sqrt(off / power) > least)
             reason = EYE_NEITHER;
     }
     code[segments] = '\0';

@@ -23,6 +23,8 @@
 #define BLUR_GUESS 0.55
 #define PITCH_PRIOR 0.03 /* radians by which camera or pole may lean towards each other */
 #define MOST_LAG 3
+#define ASTRAY 2.5      /* times the rest that the other channel leaves */
+#define USUAL_NOISE 0.1 /* rest, of bright - dark, that says nothing about a channel */
 #define SETTLED 0.01     /* rows by which boundaries still move when a fit may end */
 #define RIDGE 1e-9
 
@@ -344,6 +346,14 @@ int eye_fit_scale(const eye_upright *u, const eye_task *task, const char *code,
         *out = other;
         return EYE_READ;
     }
+    /* One that went astray does not count. */
+    if (other.noise > ASTRAY * out->noise && other.noise > USUAL_NOISE)
+        return EYE_READ;
+    if (out->noise > ASTRAY * other.noise && out->noise > USUAL_NOISE) {
+        *out = other;
+        return EYE_READ;
+    }
+    out->blur = other.blur < out->blur ? other.blur : out->blur;
     double middle_sigma = out->unit_sigma, other_sigma = other.unit_sigma;
     merge(&out->middle, &middle_sigma, other.middle, other_sigma);
     double unit_sigma = out->unit_sigma * out->unit;

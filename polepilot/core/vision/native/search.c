@@ -25,7 +25,8 @@
 #define GAP 22
 #define BESIDE 4          /* rows above and below that take part */
 #define LEAST_STEP 8     /* grey levels; less is noise */
-#define SHALLOW 0.55      /* share of the peaks beside it above which a valley is texture or noise */
+#define FAINT 0.35        /* share of the peaks beside it below which a run is noise */
+#define SHALLOW 0.45      /* share of the peaks beside it above which a valley is texture or noise */
 #define SHOULDER 0.12     /* an edge has ended where it grows by less than this share */
 #define STEEP 0.065       /* columns per row of the slanting looks */
 
@@ -39,6 +40,7 @@ typedef struct {
     float column, top, bottom;
     int16_t bits, id;
     int8_t open_top, open_bottom, slant;
+    uint8_t contrast; /* of the dimmest run and the brightest valley */
 } hit;
 
 typedef struct {
@@ -175,16 +177,22 @@ static int find_runs(const uint8_t *s, int rows, run *runs)
     return count;
 }
 
-/* The same runs with those joined that only a shallow valley parts; returns how many.
- *
- * Far fences are shallow valleys, and so are the noise and the texture of what is near: both
- * readings of a column are looked at. */
-static int join_runs(const run *runs, int count, run *joined)
+/* The same runs without what is noise or texture if the code is near: runs much fainter than those
+ * beside them are left out, and runs that only a shallow valley parts are joined. Far fences are
+ * shallow valleys as well, so both readings of a column are looked at. Returns how many are left. */
+static int smooth_runs(const run *runs, int count, run *smooth)
 {
     int n = 0;
     for (int i = 0; i < count; i++) {
+        int above = i > 0 ? runs[i - 1].peak : 0;
+        int below = i + 1 < count ? runs[i + 1].peak : 0;
+        if (runs[i].peak < FAINT * above || runs[i].peak < FAINT * below) {
+            if (n > 0 && runs[i].valley < smooth[n - 1].valley)
+                smooth[n - 1].valley = runs[i].valley;
+            continue;
+        }
         if (n > 0) {
-            run *before = joined + n - 1;
+            run *before = smooth + n - 1;
             int lower = before->peak < runs[i].peak ? before->peak : runs[i].peak;
             if (before->valley > SHALLOW * lower) {
                 before->end = runs[i].end;
@@ -193,7 +201,7 @@ static int join_runs(const run *runs, int count, run *joined)
                 continue;
             }
         }
-        joined[n++] = runs[i];
+        smooth[n++] = runs[i];
     }
     return n;
 }
@@ -250,6 +258,7 @@ static int match(search *s, const run *runs, int count, float column, int slant)
                 h->open_top = above > 2 * unit + slack || upper->start <= 0.0f;
                 h->open_bottom = below > 2 * unit + slack || lower->end >= (float)(rows - 1);
                 h->slant = (int8_t)slant;
+                h->contrast = (uint8_t)(dimmest - brightest);
                 found++;
             }
         }
@@ -265,15 +274,16 @@ static int match_near(search *s, const uint8_t *signal, int rows, run *runs, flo
     if (n < 3)
         return 0;
     int hits = match(s, runs, n, column, slant);
-    int joined = join_runs(runs, n, runs + MOST_RUNS);
-    if (joined < n && joined >= 3)
-        hits += match(s, runs + MOST_RUNS, joined, column, slant);
+    int left = smooth_runs(runs, n, runs + MOST_RUNS);
+    if (left < n && left >= 3)
+        hits += match(s, runs + MOST_RUNS, left, column, slant);
     return hits;
 }
 
 /* How badly the segments' light, read off its running sum, fits any code of that place and size:
  * the mean square of what is left over, of bright - dark; ``id`` is what it reads. */
-static float comb(const float *sum, int rows, float top, float unit, int bits, int *id)
+static float comb(const float *sum, int rows, float top, float unit, int bits, int *id,
+                  float *contrast)
 {
     int segments = 2 * bits + 5;
     float level[EYE_MOST_SEGMENTS], before = 0;
@@ -306,6 +316,7 @@ static float comb(const float *sum, int rows, float top, float unit, int bits, i
         }
         rest += off * off;
     }
+    *contrast = step;
     return rest / (step * step * (float)segments);
 }
 
@@ -335,6 +346,7 @@ static int match_far(search *s, const uint8_t *signal, int rows, int x, const in
         for (int b = 0; b < s->n_bits; b++) {
             int bits = s->bits[b], id = 0, best_id = 0;
             float segments = (float)(2 * bits + 5), best = MOST_REST, best_top = 0, best_unit = 0;
+            float step = 0, best_step = 0;
             float least = ((float)height - 8) / segments, most = ((float)height + 2) / segments;
             float middle = (float)(from - first) + (float)height / 2;
             least = least < (float)SHORTEST ? (float)SHORTEST : least;
@@ -342,12 +354,13 @@ static int match_far(search *s, const uint8_t *signal, int rows, int x, const in
                 float reach = 1.5f + 0.3f * unit;
                 for (float off = -reach; off <= reach; off += 0.5f) {
                     float top = middle + off - unit * segments / 2;
-                    float rest = comb(sum, end - first, top, unit, bits, &id);
+                    float rest = comb(sum, end - first, top, unit, bits, &id, &step);
                     if (rest < best) {
                         best = rest;
                         best_id = id;
                         best_top = top;
                         best_unit = unit;
+                        best_step = step;
                     }
                 }
             }
@@ -359,7 +372,8 @@ static int match_far(search *s, const uint8_t *signal, int rows, int x, const in
                                          .bottom = top + (segments - 4) * best_unit,
                                          .bits = (int16_t)bits,
                                          .id = (int16_t)best_id,
-                                         .slant = (int8_t)slant};
+                                         .slant = (int8_t)slant,
+                                         .contrast = (uint8_t)best_step};
             hits++;
         }
     }
@@ -384,11 +398,11 @@ static int by_column(const void *a, const void *b)
     return x->top < y->top ? -1 : x->top > y->top;
 }
 
-static int by_width(const void *a, const void *b)
+static int by_evidence(const void *a, const void *b)
 {
     const eye_candidate *x = a, *y = b;
-    if (x->width != y->width)
-        return y->width - x->width;
+    if (x->evidence != y->evidence)
+        return y->evidence - x->evidence;
     return x->column < y->column ? -1 : x->column > y->column;
 }
 
@@ -435,7 +449,7 @@ static int gather(search *s, eye_candidate *found)
     }
     for (int g = 0; g < n_groups; g++) {
         int votes[EYE_IDS] = {0};
-        int n = 0, open_top = 0, open_bottom = 0, best = 0;
+        int n = 0, open_top = 0, open_bottom = 0, best = 0, contrast = 0;
         for (int i = groups[g].first; i < s->n_hits; i++) {
             if (owner[i] != g)
                 continue;
@@ -444,6 +458,7 @@ static int gather(search *s, eye_candidate *found)
             values[s->n_hits + n] = h->bottom;
             n++;
             open_top += h->open_top;
+            contrast += h->contrast;
             open_bottom += h->open_bottom;
             if (++votes[h->id] > votes[best])
                 best = h->id;
@@ -460,12 +475,12 @@ static int gather(search *s, eye_candidate *found)
             .lean = lean,
             .top = values[n / 2],
             .bottom = values[s->n_hits + n / 2],
-            .width = groups[g].count,
+            .evidence = contrast,
             .open_top = 2 * open_top > n,
             .open_bottom = 2 * open_bottom > n,
         };
     }
-    qsort(all, (size_t)n_groups, sizeof *all, by_width);
+    qsort(all, (size_t)n_groups, sizeof *all, by_evidence);
     for (int g = 0; g < n_groups && n_found < EYE_MOST_CANDIDATES; g++) {
         int known = 0;
         for (int f = 0; f < n_found && !known; f++) {
@@ -514,7 +529,7 @@ static void look(search *s, int slant, const uint8_t *wanted, uint8_t *again, ui
     }
 }
 
-/* The candidates of a picture, the widest first; -1 where there is no memory. */
+/* The candidates of a picture, the clearest first; -1 where there is no memory. */
 int eye_search(const eye_picture *picture, const eye_task *task, eye_candidate *found)
 {
     int rows_padded = (picture->rows + 15) / 16 * 16;

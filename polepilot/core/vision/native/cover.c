@@ -1,0 +1,115 @@
+/* Whether something dark lies over the strip.
+ *
+ * A branch or a sleeve in front turns a bright bit into a dark one, and a legal code into another.
+ * It goes on to both sides of the strip and ends above and below. */
+#include "eye.h"
+
+#include <math.h>
+
+#define STANDS_OUT 0.18 /* of bright - dark, in any channel */
+#define SAME 0.06       /* the same, of one thing that goes on beside the strip */
+#define ASLANT 0.6      /* segments */
+#define UNLIKE 2.5      /* times nearer to the other black than to what is beside it: paint */
+#define ROWS 3
+#define COLUMNS 3
+
+/* Mean light beside a segment; 0 where that lies outside the picture. */
+static int beside(const eye_picture *p, double row, double reach, double column, double step,
+                  double *light)
+{
+    int n = 0;
+    for (int c = 0; c < p->channels; c++)
+        light[c] = 0;
+    for (int i = 0; i < ROWS; i++) {
+        int y = (int)lround(row + reach * (i - 1));
+        if (y < 0 || y >= p->rows)
+            continue;
+        for (int k = 0; k < COLUMNS; k++) {
+            int x = (int)lround(column + step * k);
+            if (x < 0 || x >= p->columns)
+                continue;
+            const uint8_t *pixel = p->pixels + (ptrdiff_t)y * p->stride + x * p->channels;
+            for (int c = 0; c < p->channels; c++)
+                light[c] += eye_linear(pixel[c]);
+            n++;
+        }
+    }
+    for (int c = 0; c < p->channels; c++)
+        light[c] /= n > 0 ? n : 1;
+    return n >= 2;
+}
+
+/* The middle one of the dark segments' levels: the paint, even if some of them are covered. */
+static double median_dark(double levels[][3], const char *code, int segments, int channel)
+{
+    double values[EYE_MOST_SEGMENTS];
+    int n = 0;
+    for (int i = 2; i < segments - 2; i++) {
+        if (code[i] != '0')
+            continue;
+        int at = n++;
+        for (; at > 0 && values[at - 1] > levels[i][channel]; at--)
+            values[at] = values[at - 1];
+        values[at] = levels[i][channel];
+    }
+    return (values[(n - 1) / 2] + values[n / 2]) / 2;
+}
+
+/* Whether a bit that reads dark may be something else in front of it. */
+int eye_covered(const eye_picture *p, const eye_upright *u, const eye_scale *scale,
+                const eye_side *side, const char *code, double levels[][3], int segments,
+                double noise)
+{
+    double contrast = 0, black[3];
+    int clear[2][EYE_MOST_SEGMENTS], same[2][EYE_MOST_SEGMENTS];
+    for (int c = 0; c < p->channels; c++) {
+        black[c] = median_dark(levels, code, segments, c);
+        double bright = (levels[0][c] + levels[1][c] + levels[segments - 2][c] +
+                         levels[segments - 1][c]) / 4;
+        contrast = bright - black[c] > contrast ? bright - black[c] : contrast;
+    }
+    double gap = side->half + 1.0 + 1.2 * side->blur;
+    double apart = side->half / 4 > 1 ? side->half / 4 : 1;
+    for (int way = 0; way < 2; way++) {
+        int sign = way == 0 ? -1 : 1;
+        for (int i = 0; i < segments; i++) {
+            clear[way][i] = same[way][i] = 0;
+            for (int tilt = -1; tilt <= 1; tilt++) { /* what lies across may lie aslant */
+                double place = i + 0.5 + ASLANT * tilt - segments / 2.0;
+                double row = scale->middle + scale->unit * place;
+                double column = side->column + u->lean * (row - u->row) + sign * gap;
+                double light[3], most = 0, unlike = 0;
+                if (!beside(p, row, 0.2 * scale->unit, column, sign * apart, light))
+                    return 0;
+                for (int c = 0; c < p->channels; c++) {
+                    double off = fabs(light[c] - (code[i] == '0' ? levels[i][c] : black[c]));
+                    most = off > most ? off : most;
+                    off = fabs(levels[i][c] - black[c]);
+                    unlike = off > unlike ? off : unlike;
+                }
+                clear[way][i] |= tilt == 0 && most > STANDS_OUT * contrast;
+                /* More like what is beside it than like the other black. */
+                same[way][i] |= most < (SAME + noise) * contrast && most < UNLIKE * unlike;
+            }
+        }
+    }
+    for (int i = 3; i < segments - 3; i += 2) {
+        if (code[i] == '1')
+            continue;
+        int covered = same[0][i] && same[1][i];
+        for (int way = 0; way < 2; way++) {
+            int above = i, below = i;
+            above -= clear[way][i]; /* aslant: beside it, it lies higher or lower */
+            below += clear[way][i];
+            while (above >= 0 && !clear[way][above])
+                above--;
+            while (below < segments && !clear[way][below])
+                below++;
+            /* It begins and ends beside the strip; a dark floor or wall does not. */
+            covered &= above >= 0 && below < segments && below - above > 1;
+        }
+        if (covered)
+            return 1;
+    }
+    return 0;
+}

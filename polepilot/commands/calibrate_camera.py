@@ -82,7 +82,7 @@ def calibrate_constant(
     camera, fit = solve_constant(pictures, distances, kinds, only, camera)
     if annotate is not None:
         _draw(pictures, fit, kinds, annotate)
-    return _outcome(camera, fit, settings, judge(fit))
+    return _outcome(camera, fit, settings, judge(fit, camera.width))
 
 
 def starting_camera(settings: Settings, width: int, height: int) -> Camera:

@@ -37,8 +37,10 @@ _OUTLIER = 4.0
 """Sigmas beyond which a picture disagrees with the others."""
 _LEAST_DISAGREEMENT = 0.003
 """And it has to be off by this share of its distance."""
-_OFFSET = 0.01
-"""An error common to all distances is spoken of from here on, metres."""
+_OFFSET, _LARGEST_OFFSET = 0.01, 0.3
+"""An error common to all distances is spoken of from here on, and up to there, metres."""
+_USUAL = (0.2, 20.0)
+"""Camera constants per width of a picture, from the widest lenses to telescopes."""
 _APART = 1.2
 """Distances whose ratio is less count as one."""
 _GOOD, _FAIR = 0.005, 0.015
@@ -184,21 +186,26 @@ def fit_constant(samples: Sequence[KnownRange]) -> ConstantFit:
     )
 
 
-def judge(fit: ConstantFit) -> Verdict:
-    """What to think of a fit, in words."""
+def judge(fit: ConstantFit, width: int) -> Verdict:
+    """What to think of a fit to pictures ``width`` pixels wide, in words."""
     notes = tuple(_notes(fit))
     within = f"within {fit.worst * 100:.2f} %"
     doubt = fit.standard_error / fit.constant
     good, fair = (fit.worst <= limit and doubt <= limit for limit in (_GOOD, _FAIR))
     out = fit.outliers
-    if len(fit.residuals) == 1:
-        return Verdict("fair", "one picture; nothing shows whether it is right.", notes)
+    low, high = (factor * width for factor in _USUAL)
+    if not low < fit.constant < high:
+        view = math.degrees(2 * math.atan2(width / 2, fit.constant))
+        reason = f"such a camera would see {view:.1f}° from left to right. Are these metres?"
+        return Verdict("poor", reason, notes)
     if out:
         which = "one picture disagrees" if len(out) == 1 else f"{len(out)} pictures disagree"
         named = "; ".join(_off(residual) for residual in out)
         useful = fair and 3 * len(out) <= len(fit.residuals)
         reason = f"{which}: {named}. Left out; the others agree {within}."
         return Verdict("fair" if useful else "poor", reason, notes)
+    if fair and not several_distances([residual.sample for residual in fit.residuals]):
+        return Verdict("fair", "one distance; nothing shows whether it is right.", notes)
     if good:
         return Verdict("good", f"every picture agrees {within}.", notes)
     if fair:
@@ -352,7 +359,7 @@ def _common_offset(samples: Sequence[KnownRange], constant: float, sigma: Array)
     solution = np.linalg.solve(normal, design.T @ wanted)
     after = wanted - design @ solution
     offset, doubt = float(solution[0]), math.sqrt(float(np.linalg.inv(normal)[0, 0]))
-    significant = abs(offset) > max(3 * doubt, _OFFSET)
+    significant = max(3 * doubt, _OFFSET) < abs(offset) < _LARGEST_OFFSET
     better = float(wanted @ wanted) > float(after @ after) + 9.0
     consistent = float(np.abs(after).max()) < 3.0
     return offset if significant and better and consistent else None

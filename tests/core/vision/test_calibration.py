@@ -67,8 +67,8 @@ def test_the_constant_does_not_depend_on_the_provisional_one(provisional: float)
     for residual in answer.residuals:
         assert residual.error == pytest.approx(0, abs=1e-9)
         assert residual.agrees
-    assert judge(answer).grade == "good"
-    assert judge(answer).notes == ()
+    assert judge(answer, 400).grade == "good"
+    assert judge(answer, 400).notes == ()
 
 
 def test_one_picture_is_enough_for_a_constant_but_not_for_trust() -> None:
@@ -76,15 +76,24 @@ def test_one_picture_is_enough_for_a_constant_but_not_for_trust() -> None:
     assert answer.constant == pytest.approx(TRUE, rel=1e-9)
     # 3 mm of the tape and 0.1 % of the picture: about 0.14 %.
     assert answer.standard_error == pytest.approx(0.0014 * TRUE, rel=0.05)
-    verdict = judge(answer)
+    verdict = judge(answer, 400)
     assert verdict.grade == "fair"
     assert "Only one distance" in verdict.notes[0]
+
+
+def test_centimetres_are_no_metres() -> None:
+    for factor in (100, 0.01):
+        near = [seen(d, said=d * factor) for d in (6.5, 8.0, 9.5)]
+        verdict = judge(fit(*near), 400)
+        assert verdict.grade == "poor"
+        assert "Are these metres?" in verdict.reason
 
 
 def test_many_pictures_from_one_place_share_the_error_of_the_tape() -> None:
     several = fit(*[seen(3.0) for _ in range(100)])
     assert several.standard_error > 0.0009 * TRUE
-    assert any("Only one distance" in note for note in judge(several).notes)
+    assert any("Only one distance" in note for note in judge(several, 400).notes)
+    assert judge(several, 400).grade == "fair"
     apart = fit(*[seen(2.0 + 0.05 * n) for n in range(100)])
     assert apart.standard_error < 0.0003 * TRUE
 
@@ -108,7 +117,7 @@ def test_one_picture_that_disagrees_is_named_and_left_out() -> None:
     answer = fit(seen(2.0), seen(3.0, 0.1), seen(4.0, said=4.4), seen(6.0), seen(5.0, 0.2))
     assert answer.constant == pytest.approx(TRUE, rel=1e-6)
     assert [r.sample.name for r in answer.outliers] == ["4m.png"]
-    verdict = judge(answer)
+    verdict = judge(answer, 400)
     assert verdict.grade == "fair"
     assert "one picture disagrees: 4m.png by 9.1 % (40.0 cm too near)" in verdict.reason
 
@@ -125,7 +134,7 @@ def test_one_of_three_is_found_too(wrong: int, factor: float) -> None:
     answer = fit(*samples)
     assert answer.constant == pytest.approx(TRUE, rel=0.002)
     assert [r.agrees for r in answer.residuals] == [n != wrong for n in range(3)]
-    assert judge(answer).grade == "fair"
+    assert judge(answer, 400).grade == "fair"
 
 
 def test_an_unsharp_picture_does_not_spoil_the_others() -> None:
@@ -134,24 +143,24 @@ def test_an_unsharp_picture_does_not_spoil_the_others() -> None:
     answer = fit(seen(2.5), seen(4.0), vague)
     assert answer.constant == pytest.approx(TRUE, rel=0.001)
     assert answer.worst < 0.001
-    verdict = judge(answer)
+    verdict = judge(answer, 400)
     assert verdict.grade == "good"
     assert "7m.png (to 0.9 %)" in verdict.notes[0]
     # Sharper, the same error would be one.
     vague = replace(vague, detection=replace(vague.detection, range_sigma=0.015))
-    assert judge(fit(seen(2.5), seen(4.0), vague)).grade == "fair"
+    assert judge(fit(seen(2.5), seen(4.0), vague), 400).grade == "fair"
 
 
 def test_two_pictures_that_contradict_each_other() -> None:
     answer = fit(seen(3.0), seen(3.1, said=3.5))
     assert answer.outliers == ()
-    verdict = judge(answer)
+    verdict = judge(answer, 400)
     assert verdict.grade == "poor"
     assert "contradict each other" in verdict.reason
 
 
 def test_three_pictures_two_of_which_are_wrong_are_not_taken_for_good() -> None:
-    verdict = judge(fit(seen(2.0, said=2.3), seen(4.0), seen(6.0, said=5.0)))
+    verdict = judge(fit(seen(2.0, said=2.3), seen(4.0), seen(6.0, said=5.0)), 400)
     assert verdict.grade == "poor"
 
 
@@ -161,7 +170,7 @@ def test_distances_measured_from_the_wrong_place(off: float) -> None:
     answer = fit(*[seen(d, said=d - off) for d in distances])
     assert answer.offset == pytest.approx(off, abs=0.005)
     word = "short" if off > 0 else "long"
-    assert f"All distances seem {abs(off) * 100:.1f} cm too {word}" in judge(answer).notes[0]
+    assert f"All distances seem {abs(off) * 100:.1f} cm too {word}" in judge(answer, 400).notes[0]
 
 
 def test_sizes_change_the_words_and_nothing_else() -> None:
@@ -195,7 +204,7 @@ def test_rendered_pictures() -> None:
         samples.append(KnownRange(f"{away} m", away, found, provisional.constant, KIND.axis_depth))
     answer = fit_constant(samples)
     assert answer.constant == pytest.approx(TRUE, rel=0.003)
-    assert judge(answer).grade == "good"
+    assert judge(answer, 400).grade == "good"
 
 
 @pytest.mark.parametrize("size", [(1600, 1200), (1920, 1080), (1280, 1024), (640, 480)])

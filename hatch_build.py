@@ -39,8 +39,7 @@ class BuildHook(BuildHookInterface):  # type: ignore[misc]
             return
         page.build_page(ROOT)
         build_data["artifacts"].append(f"/{page.STATIC.as_posix()}/**")
-        if not kernel.build(ROOT):
-            return
+        kernel.build(ROOT)
         build_data["artifacts"].append(f"/{kernel.LIBRARY.as_posix()}")
         if version == "standard":
             # Loaded by ctypes, the library fits every Python of this platform.

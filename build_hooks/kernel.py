@@ -57,19 +57,16 @@ class Compiler:
 
 
 def build(root: Path) -> bool:
-    """Build the kernel if it is out of date; False where there is nothing to build.
+    """Build the kernel if it is out of date; True where something was done.
 
     Raises:
-        BuildError: there is no compiler, or it refuses the sources.
+        BuildError: there are no sources or no compiler, or it refuses the sources.
     """
     sources = sources_of(root)
-    if not sources:
-        say("no kernel sources.")
-        return False
     compiler = find_compiler()
     if is_current(root, compiler):
         say("the eye's kernel is up to date.")
-        return True
+        return False
     if compiler is None:
         raise BuildError(f"the eye's kernel cannot be built: there is no C compiler. {ADVICE}")
     say(f"building the eye's kernel with {compiler.name} ...")
@@ -94,14 +91,13 @@ def build_sanitized(root: Path, out: Path) -> Path:
         The library that has to be preloaded (LD_PRELOAD) to load it into Python.
 
     Raises:
-        BuildError: there is no gcc or clang (Zig has no sanitizer), or it refuses the sources.
+        BuildError: there are no sources, or no gcc or clang (Zig has no sanitizer), or it refuses
+            the sources.
     """
     compiler = machine_compiler()
     if compiler is None:
         raise BuildError(f"sanitizing needs gcc or clang. {ADVICE}")
     sources = sources_of(root)
-    if not sources:
-        raise BuildError(f"there is no C source in {root / SOURCES}.")
     say(f"building the eye's kernel with {compiler.name} and sanitizers ...")
     # clang links its runtime into programs only, unless told otherwise
     flags = (*SANITIZE, "-shared-libasan") if "clang" in compiler.name else SANITIZE
@@ -116,14 +112,21 @@ def build_sanitized(root: Path, out: Path) -> Path:
 
 def build_requirements(root: Path) -> list[str]:
     """What pip has to fetch for the build: Zig, where the machine has no compiler of its own."""
-    if not sources_of(root) or machine_compiler() is not None or is_current(root, None):
+    if machine_compiler() is not None or is_current(root, None):
         return []
     return [ZIGLANG]
 
 
 def sources_of(root: Path) -> list[Path]:
-    """The C sources, in order."""
-    return sorted((root / SOURCES).glob("*.c"))
+    """The C sources, in order.
+
+    Raises:
+        BuildError: there are none.
+    """
+    sources = sorted((root / SOURCES).glob("*.c"))
+    if not sources:
+        raise BuildError(f"the eye's kernel cannot be built: no C source in {root / SOURCES}.")
+    return sources
 
 
 def source_hash(root: Path) -> str:

@@ -4,13 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-#define STEPS 1200
-#define REACH 6.0
-
-static float cumulative_table[STEPS + 2];
-static float bell_table[STEPS + 2];
-static float linear_table[256];
-static float fine_table[4096];
+float eye_cumulative_table[EYE_STEPS + 2], eye_bell_table[EYE_STEPS + 2];
+float eye_linear_table[256], eye_fine_table[4096];
 
 static double srgb(double grey)
 {
@@ -20,42 +15,16 @@ static double srgb(double grey)
 /* Before anything else runs, so that all threads find the tables full. */
 __attribute__((constructor)) static void fill_tables(void)
 {
-    for (int i = 0; i < STEPS + 2; i++) {
-        double z = 2 * REACH * i / STEPS - REACH;
-        cumulative_table[i] = (float)(0.5 * erfc(-z / sqrt(2.0)));
-        bell_table[i] = (float)(exp(-0.5 * z * z) / sqrt(2.0 * 3.14159265358979323846));
+    for (int i = 0; i < EYE_STEPS + 2; i++) {
+        double z = 2 * EYE_REACH * i / EYE_STEPS - EYE_REACH;
+        eye_cumulative_table[i] = (float)(0.5 * erfc(-z / sqrt(2.0)));
+        eye_bell_table[i] = (float)(exp(-0.5 * z * z) / sqrt(2.0 * 3.14159265358979323846));
     }
     for (int i = 0; i < 256; i++)
-        linear_table[i] = (float)srgb(i / 255.0);
+        eye_linear_table[i] = (float)srgb(i / 255.0);
     for (int i = 0; i < 4096; i++)
-        fine_table[i] = (float)srgb(i / 4080.0);
+        eye_fine_table[i] = (float)srgb(i / 4080.0);
 }
-
-static double look_up(const float *table, double z)
-{
-    double place = (z + REACH) * (STEPS / (2 * REACH));
-    int at = (int)place;
-    double rest = place - at;
-    return table[at] + rest * (table[at + 1] - table[at]);
-}
-
-/* The normal distribution's cumulative function, to 1e-5. */
-double eye_cumulative(double z)
-{
-    if (z <= -REACH)
-        return 0.0;
-    return z >= REACH ? 1.0 : look_up(cumulative_table, z);
-}
-
-/* The normal distribution's density, to 1e-5. */
-double eye_bell(double z)
-{
-    return z <= -REACH || z >= REACH ? 0.0 : look_up(bell_table, z);
-}
-
-float eye_linear(int grey) { return linear_table[grey]; }
-
-float eye_linear_sixteenths(int level) { return fine_table[level]; }
 
 /* Solves matrix x = right in place by Cholesky; ``matrix`` (n x n, symmetric, row by row) is
  * overwritten, ``right`` holds ``rights`` columns side by side. 0 where it is not positive. */

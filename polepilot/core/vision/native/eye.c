@@ -10,6 +10,7 @@
 #define USUAL_SIDE_NOISE 0.06  /* rms rest of the fit across, of its peak */
 #define USUAL_PITCH 0.035      /* radians between camera and pole */
 #define USUAL_TINT 0.12
+#define FEW_ROWS 6.0           /* per segment: JPEG blurs colour by up to as much */
 #define MOST_BLUR 0.5          /* rows, and three tenths of a segment */
 #define SHORTEST 1.25          /* rows per segment */
 
@@ -47,10 +48,41 @@ static double misfit(const eye_strip *strip, double constant)
     return edges * edges + sides * sides + bend * bend + tint * tint;
 }
 
+/* Fits and reads a straightened strip; the reason where it is no code. ``id`` is what the search
+ * has read, and then what the levels say. */
+static int read_strip(const eye_task *task, const eye_candidate *candidate,
+                      const eye_upright *upright, int sharp, int *id, eye_scale *scale,
+                      double levels[][3], eye_strip *out)
+{
+    int segments = 2 * candidate->bits + 5;
+    char code[EYE_MOST_SEGMENTS + 3];
+    eye_encode(*id, candidate->bits, code);
+    int reason = eye_fit_scale(upright, task, code, candidate, sharp, scale);
+    if (reason != EYE_READ)
+        return reason;
+    out->row = scale->middle;
+    out->unit = scale->unit;
+    out->blur = scale->blur;
+    out->noise = scale->noise;
+    out->width = thickest(task, candidate->bits) * scale->unit;
+    if (!eye_segment_levels(upright, scale, segments, levels))
+        return EYE_NO_SCALE;
+    double noise = scale->noise / sqrt(scale->unit > 1 ? scale->unit : 1);
+    reason = eye_read(task, levels, segments, upright->channels, noise, out->width, out->code,
+                      &out->tint);
+    if (reason != EYE_READ)
+        return reason;
+    int seen = eye_decode(out->code, segments), wanted = *id;
+    if (seen == 0)
+        return EYE_NO_CODE;
+    *id = seen;
+    return seen == wanted ? EYE_READ : EYE_NO_CODE;
+}
+
 static int examine(const eye_picture *picture, const eye_task *task, eye_candidate *candidate,
                    eye_strip *out)
 {
-    int segments = 2 * candidate->bits + 5, id = candidate->id;
+    int segments = 2 * candidate->bits + 5, id = candidate->id, reason = EYE_NO_CODE;
     char code[EYE_MOST_SEGMENTS + 3];
     eye_upright upright;
     eye_scale scale;
@@ -59,42 +91,38 @@ static int examine(const eye_picture *picture, const eye_task *task, eye_candida
     out->column = candidate->column;
     out->row = (candidate->top + candidate->bottom) / 2;
     out->unit = (candidate->bottom - candidate->top) / (segments - 4);
-    out->lean = candidate->lean;
     out->width = thickest(task, candidate->bits) * out->unit;
     eye_encode(id, candidate->bits, out->code);
-    /* A segment misread at whole pixels shows in the levels: fit again with what they say. */
-    for (int attempt = 0; attempt < 2; attempt++) {
+    /* A segment misread at whole pixels shows in the levels: look again with what they say. Where
+     * the brightest channel is too blurred to be read the brightness may be sharp enough. */
+    for (int attempt = 0; attempt < 2 && reason != EYE_READ; attempt++) {
+        int before = id;
         eye_encode(id, candidate->bits, code);
-        double aspect = thickest(task, candidate->bits);
-        int reason = eye_straighten(picture, task, candidate, code, aspect, &upright);
+        reason = eye_straighten(picture, task, candidate, code, thickest(task, candidate->bits),
+                                &upright);
         if (reason != EYE_READ)
             return reason;
         out->column = upright.column;
         out->lean = upright.lean;
-        reason = eye_fit_scale(&upright, task, code, candidate, &scale);
-        if (reason != EYE_READ)
-            return reason;
-        out->row = scale.middle;
-        out->unit = scale.unit;
-        out->width = thickest(task, candidate->bits) * scale.unit;
-        out->blur = scale.blur;
-        out->noise = scale.noise;
-        if (!eye_segment_levels(&upright, &scale, segments, levels))
-            return EYE_NO_SCALE;
-        double noise = scale.noise / sqrt(scale.unit > 1 ? scale.unit : 1);
-        reason = eye_read(task, levels, segments, picture->channels, noise, out->width,
-                          out->code, &out->tint);
-        if (reason != EYE_READ)
-            return reason;
-        int seen = eye_decode(out->code, segments);
-        if (seen == 0)
-            return EYE_NO_CODE;
-        if (seen == id)
+        int sharp = 0;
+        reason = read_strip(task, candidate, &upright, sharp, &id, &scale, levels, out);
+        if (reason != EYE_READ && id == before && picture->channels == 3 &&
+            out->unit < FEW_ROWS) {
+            sharp = 1;
+            reason = read_strip(task, candidate, &upright, sharp, &id, &scale, levels, out);
+        }
+        if (reason == EYE_READ && !sharp && picture->channels == 3)
+            eye_refine_scale(&upright, task, out->code, candidate, &scale);
+        if (id == before)
             break;
-        if (attempt == 1)
-            return EYE_NO_CODE;
-        id = seen;
     }
+    if (reason != EYE_READ)
+        return reason;
+    out->row = scale.middle;
+    out->unit = scale.unit;
+    out->blur = scale.blur;
+    out->noise = scale.noise;
+    out->width = thickest(task, candidate->bits) * scale.unit;
     out->id = id;
     if (scale.unit < SHORTEST || scale.blur > MOST_BLUR + 0.3 * scale.unit)
         return EYE_POOR_FIT;
@@ -102,7 +130,7 @@ static int examine(const eye_picture *picture, const eye_task *task, eye_candida
     if (kind->bits != candidate->bits)
         return EYE_UNKNOWN_ID;
     eye_side side;
-    int reason = eye_fit_side(picture, &upright, half_width(task, kind, scale.unit), kind->flat,
+    reason = eye_fit_side(picture, &upright, half_width(task, kind, scale.unit), kind->flat,
                               &side);
     if (reason != EYE_READ)
         return reason;

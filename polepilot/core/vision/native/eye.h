@@ -94,14 +94,14 @@ EYE_PUBLIC int32_t eye_version(void);
 /* A candidate: neighbouring columns that show one code, good to about a pixel. */
 typedef struct {
     int bits, id;
-    double column, lean;
+    double column;
     double top, bottom; /* the boundaries inside the end bars: after segment 2, before N - 2 */
     int evidence;       /* contrast, summed up over the columns that agreed */
     int open_top, open_bottom; /* something bright goes on beyond the end bar */
 } eye_candidate;
 
 #define EYE_FAINTEST 16 /* grey levels of colour that are none */
-#define EYE_MOST_CANDIDATES 40
+#define EYE_MOST_CANDIDATES 24
 #define EYE_MOST_ROWS 512
 #define EYE_MOST_COLUMNS 160
 
@@ -140,7 +140,9 @@ int eye_straighten(const eye_picture *picture, const eye_task *task,
                    const eye_candidate *candidate, const char *code, double aspect,
                    eye_upright *out);
 int eye_fit_scale(const eye_upright *upright, const eye_task *task, const char *code,
-                  const eye_candidate *candidate, eye_scale *out);
+                  const eye_candidate *candidate, int sharp, eye_scale *out);
+int eye_refine_scale(const eye_upright *upright, const eye_task *task, const char *code,
+                     const eye_candidate *candidate, eye_scale *scale);
 int eye_segment_levels(const eye_upright *upright, const eye_scale *scale, int segments,
                        double levels[][3]);
 int eye_read(const eye_task *task, double levels[][3], int segments, int channels, double noise,
@@ -153,13 +155,41 @@ int eye_covered(const eye_picture *picture, const eye_upright *upright, const ey
                 double noise);
 
 /* algebra.c */
-double eye_cumulative(double z);
-double eye_bell(double z);
 int eye_solve(double *matrix, double *right, int n, int rights);
-float eye_linear(int grey);        /* 0..255 */
-float eye_linear_sixteenths(int level); /* 0..4080 */
 int eye_decode(const char *code, int segments);
 void eye_encode(int id, int bits, char *code);
+
+/* Tables, filled before anything runs. */
+#define EYE_STEPS 1200 /* of the normal distribution, from -EYE_REACH to EYE_REACH */
+#define EYE_REACH 6.0
+extern float eye_cumulative_table[EYE_STEPS + 2], eye_bell_table[EYE_STEPS + 2];
+extern float eye_linear_table[256], eye_fine_table[4096];
+
+static inline double eye_look_up(const float *table, double z)
+{
+    double place = (z + EYE_REACH) * (EYE_STEPS / (2 * EYE_REACH));
+    int at = (int)place;
+    double rest = place - at;
+    return table[at] + rest * (table[at + 1] - table[at]);
+}
+
+/* The normal distribution's cumulative function, to 1e-5. */
+static inline double eye_cumulative(double z)
+{
+    if (z <= -EYE_REACH)
+        return 0.0;
+    return z >= EYE_REACH ? 1.0 : eye_look_up(eye_cumulative_table, z);
+}
+
+/* The normal distribution's density, to 1e-5. */
+static inline double eye_bell(double z)
+{
+    return z <= -EYE_REACH || z >= EYE_REACH ? 0.0 : eye_look_up(eye_bell_table, z);
+}
+
+/* Linear light of a grey level (0 to 255), and of sixteenths of one (0 to 4080). */
+static inline float eye_linear(int grey) { return eye_linear_table[grey]; }
+static inline float eye_linear_sixteenths(int level) { return eye_fine_table[level]; }
 
 /* Brightness of a pixel, in sixteenths of a grey level. */
 static inline int eye_brightness(const uint8_t *pixel, int channels, const eye_task *task)

@@ -78,36 +78,54 @@ static inline slope step_at(double upper, double lower, double place, double blu
                    size * (b1 - b0)};
 }
 
-/* One row of the model: basis of the levels, derivatives by the rest; returns the prediction. */
-static double model_row(const code_shape *shape, const double *guess, double upper, double lower,
-                        double *row)
+/* Where all boundaries lie for one set of values, and what is the same for every row. */
+typedef struct {
+    double place[MOST_EDGES], squeeze[MOST_EDGES];
+    double reach; /* rows on either side of a boundary in which it shows */
+} layout;
+
+static void lay_out(const code_shape *shape, const double *guess, layout *out)
 {
-    double bright = 0, first = 0, last = 0;
+    for (int k = 0; k < shape->edges; k++) {
+        out->place[k] = row_of(guess, shape->place[k]) - guess[GROWTH] * shape->sign[k];
+        out->squeeze[k] = 1 / (1 + guess[SAG] * shape->place[k]);
+    }
+    out->reach = 5 * guess[BLUR];
+}
+
+/* One row of the model: basis of the levels, derivatives by the rest; returns the prediction.
+ * ``passed`` counts the boundaries above the row that no longer show in it; rows come in order. */
+static double model_row(const code_shape *shape, const layout *at, const double *guess,
+                        double upper, double lower, int *passed, double *row)
+{
+    int last_edge = shape->edges - 1;
+    while (*passed <= last_edge && at->place[*passed] < upper - at->reach)
+        ++*passed;
+    /* Signs alternate, the first is 1: what has been passed leaves bright or dark. */
+    double bright = *passed % 2 && *passed <= last_edge ? 1 : 0;
+    double first = *passed > 0 ? 1 : 0, last = *passed > last_edge ? 1 : 0;
     double by_middle = 0, by_unit = 0, by_blur = 0, by_growth = 0, by_sag = 0;
     double shift = 2 * ((upper + lower) / 2 - guess[MIDDLE]) / (guess[UNIT] * shape->segments);
     shift = shift < -1.2 ? -1.2 : shift > 1.2 ? 1.2 : shift;
     double light = guess[1] + guess[2] * shift, shade = guess[3] + guess[4] * shift;
-    for (int k = 0; k < shape->edges; k++) {
+    for (int k = *passed; k <= last_edge && at->place[k] < lower + at->reach; k++) {
         double q = shape->place[k], sign = shape->sign[k];
-        double place = row_of(guess, q) - guess[GROWTH] * sign;
-        slope s = step_at(upper, lower, place, guess[BLUR]);
+        slope s = step_at(upper, lower, at->place[k], guess[BLUR]);
         bright += sign * s.step;
         double jump = sign * (light - shade);
         if (k == 0) {
             first = s.step;
             jump = light - guess[0];
-        } else if (k == shape->edges - 1) {
+        } else if (k == last_edge) {
             last = s.step;
             jump = guess[5] - light;
         }
-        if (s.by_place != 0) {
-            double move = jump * s.by_place, squeeze = 1 / (1 + guess[SAG] * q);
-            by_middle += move;
-            by_unit += move * q * squeeze;
-            by_sag -= move * guess[UNIT] * q * q * squeeze * squeeze;
-            by_growth -= move * sign;
-            by_blur += jump * s.by_blur;
-        }
+        double move = jump * s.by_place, moved = move * q * at->squeeze[k];
+        by_middle += move;
+        by_unit += moved;
+        by_sag -= moved * guess[UNIT] * q * at->squeeze[k];
+        by_growth -= move * sign;
+        by_blur += jump * s.by_blur;
     }
     double dark = first - last - bright;
     row[0] = 1 - first;
@@ -154,9 +172,12 @@ static int fit_levels(const eye_upright *u, const double *light, const code_shap
                       double *guess, int from, int to)
 {
     double matrix[LINEAR * LINEAR] = {0}, right[LINEAR] = {0}, row[PARAMETERS];
+    layout at;
+    int passed = 0;
+    lay_out(shape, guess, &at);
     for (int i = from; i < to; i++) {
         double upper = u->first + i * u->bin;
-        model_row(shape, guess, upper, upper + u->bin, row);
+        model_row(shape, &at, guess, upper, upper + u->bin, &passed, row);
         for (int a = 0; a < LINEAR; a++) {
             right[a] += row[a] * light[i];
             for (int b = 0; b < LINEAR; b++)
@@ -207,9 +228,11 @@ static double inflation(const double *rests, int n)
     return factor < 1 ? 1 : factor > 6 ? 6 : factor;
 }
 
-/* Fits the whole code to one channel's light; the reason where it does not settle near the guess. */
+/* Fits the whole code to one channel's light; the reason where it does not settle near the guess,
+ * which is another channel's fit or, without that, the candidate. */
 static int fit_channel(const eye_upright *u, const double *light, const char *code,
-                       const eye_candidate *candidate, double constant, eye_scale *out)
+                       const eye_candidate *candidate, double constant, const eye_scale *begin,
+                       eye_scale *out)
 {
     double left_over[EYE_MOST_ROWS];
     code_shape shape;
@@ -222,6 +245,12 @@ static int fit_channel(const eye_upright *u, const double *light, const char *co
     guess[MIDDLE] = middle;
     guess[UNIT] = unit;
     guess[BLUR] = BLUR_GUESS;
+    if (begin) {
+        guess[MIDDLE] = begin->middle;
+        guess[UNIT] = begin->unit;
+        guess[BLUR] = begin->blur;
+        guess[GROWTH] = begin->growth;
+    }
     choose_rows(u, &shape, guess, candidate->open_top, candidate->open_bottom, &from, &to);
     if (to - from < PARAMETERS || !fit_levels(u, light, &shape, guess, from, to))
         return EYE_NO_SCALE;
@@ -230,10 +259,14 @@ static int fit_channel(const eye_upright *u, const double *light, const char *co
         memset(normal, 0, sizeof normal);
         memset(right, 0, sizeof right);
         double rests = 0;
+        layout at;
+        int passed = 0;
+        lay_out(&shape, guess, &at);
         plain = 0;
         for (int i = from; i < to; i++) {
             double upper = u->first + i * u->bin;
-            double rest = light[i] - model_row(&shape, guess, upper, upper + u->bin, row);
+            double rest = light[i] - model_row(&shape, &at, guess, upper, upper + u->bin,
+                                             &passed, row);
             /* Photon noise: the variance of light grows with the light. */
             double weight = 1 / (fabs(light[i]) + 0.01);
             add_row(normal, right, row, 0, PARAMETERS, rest, weight);
@@ -322,36 +355,35 @@ static void merge(double *value, double *sigma, double other, double other_sigma
     *sigma = sqrt(1 / total + share * apart * apart);
 }
 
-/* Fits the whole code; the reason where that cannot be.
- *
- * Twice: to the brightest channel, which has the least noise, and to the brightness, which cameras
- * with a mosaic of colour filters and JPEG keep sharper. Each says how uncertain it is. */
+/* Fits the whole code to the brightest channel, which has the least noise, or (``sharp``) to the
+ * brightness; the reason where that cannot be. */
 int eye_fit_scale(const eye_upright *u, const eye_task *task, const char *code,
-                  const eye_candidate *candidate, eye_scale *out)
+                  const eye_candidate *candidate, int sharp, eye_scale *out)
+{
+    double light[EYE_MOST_ROWS];
+    int channel = u->channels == 1 ? 0 : task->high;
+    for (int i = 0; i < u->rows; i++)
+        light[i] = sharp ? u->light[i] : u->channel[i][channel];
+    return fit_channel(u, light, code, candidate, task->constant, NULL, out);
+}
+
+/* Fits a code again to the brightness, which cameras with a mosaic of colour filters and JPEG keep
+ * sharper, and takes the mean of both: each says how uncertain it is. */
+int eye_refine_scale(const eye_upright *u, const eye_task *task, const char *code,
+                     const eye_candidate *candidate, eye_scale *out)
 {
     double light[EYE_MOST_ROWS];
     eye_scale other;
-    int channel = u->channels == 1 ? 0 : task->high;
-    for (int i = 0; i < u->rows; i++)
-        light[i] = u->channel[i][channel];
-    int reason = fit_channel(u, light, code, candidate, task->constant, out);
-    if (u->channels == 1)
-        return reason;
     for (int i = 0; i < u->rows; i++)
         light[i] = u->light[i];
-    int other_reason = fit_channel(u, light, code, candidate, task->constant, &other);
-    if (other_reason != EYE_READ)
-        return reason;
-    if (reason != EYE_READ) {
-        *out = other;
-        return EYE_READ;
-    }
+    if (fit_channel(u, light, code, candidate, task->constant, out, &other) != EYE_READ)
+        return 0;
     /* One that went astray does not count. */
     if (other.noise > ASTRAY * out->noise && other.noise > USUAL_NOISE)
-        return EYE_READ;
+        return 0;
     if (out->noise > ASTRAY * other.noise && out->noise > USUAL_NOISE) {
         *out = other;
-        return EYE_READ;
+        return 1;
     }
     out->blur = other.blur < out->blur ? other.blur : out->blur;
     double middle_sigma = out->unit_sigma, other_sigma = other.unit_sigma;
@@ -360,7 +392,7 @@ int eye_fit_scale(const eye_upright *u, const eye_task *task, const char *code,
     merge(&out->unit, &unit_sigma, other.unit, other.unit_sigma * other.unit);
     out->unit_sigma = unit_sigma / out->unit;
     merge(&out->sag, &out->sag_sigma, other.sag, other.sag_sigma);
-    return EYE_READ;
+    return 1;
 }
 
 /* Light of every segment with its neighbours' blur taken out, per channel. */

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define BLOCK 32          /* columns that are looked at together */
+#define BLOCK 16          /* columns that are filled together */
 #define APART 2           /* every second column is looked at */
 #define MOST_RUNS 384     /* bright runs in one column */
 #define MOST_HITS 3000    /* columns with a code; a picture full of stripes has no landmark */
@@ -20,15 +20,17 @@
 #define FRAYED 0.35       /* rows by which a bar may be shorter besides: its end has lost colour */
 #define HALF_LIGHT 0.70   /* half of the light as a share of the grey level, (1/2)^(1/2.2) = 0.73 */
 #define LEAVES_DARK 0.30  /* share of a step above which an edge has begun */
-#define SHORT_STRETCH 90  /* rows of colour, with gaps up to GAP, in which brightness is tried alone */
+#define SHORT_STRETCH 46  /* rows of colour, with gaps up to GAP, in which brightness is tried alone */
+#define ROUGH_REST 0.15f   /* the same, at whole pixels */
 #define MOST_REST 0.06f   /* mean square that a far code may leave over, of bright - dark */
 #define GAP 22
 #define BESIDE 4          /* rows above and below that take part */
-#define LEAST_STEP 8     /* grey levels; less is noise */
+#define LEAST_COLOURED 3  /* sampled rows of colour in a column that is looked at */
+#define LEAST_STEP 12    /* grey levels; less is noise */
 #define FAINT 0.35        /* share of the peaks beside it below which a run is noise */
 #define SHALLOW 0.45      /* share of the peaks beside it above which a valley is texture or noise */
+#define SHALLOWEST 0.7     /* share of the dimmest run above which fences are none */
 #define SHOULDER 0.12     /* an edge has ended where it grows by less than this share */
-#define STEEP 0.065       /* columns per row of the slanting looks */
 
 typedef struct {
     float start, end; /* rows, between pixels */
@@ -39,7 +41,7 @@ typedef struct {
 typedef struct {
     float column, top, bottom;
     int16_t bits, id;
-    int8_t open_top, open_bottom, slant;
+    int8_t open_top, open_bottom;
     uint8_t contrast; /* of the dimmest run and the brightest valley */
 } hit;
 
@@ -51,23 +53,51 @@ typedef struct {
     int n_hits;
 } search;
 
-/* The signal of every second column of a block, column by column. */
-static void fill(const search *s, int first, int count, const int *shift, uint8_t *signal,
+/* Which part of which columns has the paint's colour at all. */
+typedef struct {
+    int first, last, count; /* rows, both included; how many of the sampled ones */
+} extent;
+
+/* Every second row of every second column: even the farthest end bar is two rows high. */
+static void survey(const search *s, extent *extents)
+{
+    const eye_picture *p = s->picture;
+    int high = s->task->high, low = s->task->low, columns = (p->columns + APART - 1) / APART;
+    int coloured = p->channels == 3 && low >= 0;
+    for (int c = 0; c < columns; c++)
+        extents[c] = coloured ? (extent){p->rows, -1, 0} : (extent){0, p->rows - 1, p->rows};
+    for (int y = 0; coloured && y < p->rows; y += APART) {
+        const uint8_t *pixel = p->pixels + (ptrdiff_t)y * p->stride;
+        for (int c = 0; c < columns; c++, pixel += 3 * APART) {
+            if (6 * pixel[high] - 7 * pixel[low] <= 4 * EYE_FAINTEST)
+                continue;
+            extent *e = extents + c;
+            e->first = y < e->first ? y : e->first;
+            e->last = y;
+            e->count++;
+        }
+    }
+}
+
+/* The signal of some neighbouring columns of the survey, one after the other. */
+static void fill(const search *s, int first, int count, int top, int bottom, uint8_t *signal,
                  int rows_padded)
 {
     const eye_picture *p = s->picture;
-    int n = p->channels, last = p->columns - 1;
-    for (int y = 0; y < p->rows; y++) {
-        const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
-        int x = first + shift[y];
+    int n = p->channels, coloured = n == 3 && s->task->low >= 0;
+    int high = s->task->high, low = s->task->low;
+    memset(signal, 0, (size_t)rows_padded * (size_t)count);
+    for (int y = top; y <= bottom; y++) {
+        const uint8_t *pixel = p->pixels + (ptrdiff_t)y * p->stride + (ptrdiff_t)first * APART * n;
         uint8_t *to = signal + y;
-        for (int c = 0; c < count; c++, x += APART, to += rows_padded)
-            *to = (uint8_t)eye_signal(row + (x < 0 ? 0 : x > last ? last : x) * n, n, s->task);
+        for (int c = 0; c < count; c++, pixel += APART * n, to += rows_padded)
+            if (!coloured || 6 * pixel[high] - 7 * pixel[low] > 4 * EYE_FAINTEST)
+                *to = (uint8_t)eye_signal(pixel, n, s->task);
     }
 }
 
 /* The running sum of the brightness of three columns, grey levels of one. */
-static void fill_brightness(const search *s, int x, const int *shift, int from, int to, float *sum)
+static void fill_brightness(const search *s, int x, int from, int to, float *sum)
 {
     const eye_picture *p = s->picture;
     int n = p->channels, last = p->columns - 1;
@@ -76,7 +106,7 @@ static void fill_brightness(const search *s, int x, const int *shift, int from, 
         const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
         int total = 0;
         for (int side = -1; side <= 1; side++) {
-            int at = x + shift[y] + side;
+            int at = x + side;
             at = at < 0 ? 0 : at > last ? last : at;
             total += eye_brightness(row + at * n, n, s->task);
         }
@@ -117,7 +147,7 @@ static int find_runs(const uint8_t *s, int rows, run *runs)
     int valley = 0, valley_at = 0, before = 0; /* the last peak */
     int peaks[MOST_RUNS], valleys[MOST_RUNS + 1], places[MOST_RUNS + 1];
     while (count < MOST_RUNS) {
-        int rise = before / 8 > LEAST_STEP ? before / 8 : LEAST_STEP;
+        int rise = before / 4 > LEAST_STEP ? before / 4 : LEAST_STEP;
         for (; y < rows; y++) { /* dark: wait for a rise */
             if (s[y] == 0) {
                 uint64_t eight = 0;
@@ -141,7 +171,7 @@ static int find_runs(const uint8_t *s, int rows, run *runs)
             break;
         int peak = s[y], peak_at = y;
         for (; y < rows; y++) { /* bright: wait for a fall */
-            int fall = peak / 8 > LEAST_STEP ? peak / 8 : LEAST_STEP;
+            int fall = peak / 4 > LEAST_STEP ? peak / 4 : LEAST_STEP;
             if (s[y] > peak) {
                 peak = s[y];
                 peak_at = y;
@@ -207,9 +237,9 @@ static int smooth_runs(const run *runs, int count, run *smooth)
 }
 
 /* Every sequence of runs that looks like a code becomes a hit. */
-static int match(search *s, const run *runs, int count, float column, int slant)
+static void match(search *s, const run *runs, int count, float column)
 {
-    int found = 0, rows = s->picture->rows;
+    int rows = s->picture->rows;
     for (int b = 0; b < s->n_bits; b++) {
         int bits = s->bits[b];
         float inner = (float)(2 * bits + 1);
@@ -247,7 +277,7 @@ static int match(search *s, const run *runs, int count, float column, int slant)
                     last = bit;
                     id |= 1 << bit;
                 }
-                if (!good || brightest > 0.8 * dimmest || s->n_hits >= MOST_HITS)
+                if (!good || brightest > SHALLOWEST * dimmest || s->n_hits >= MOST_HITS)
                     continue;
                 hit *h = s->hits + s->n_hits++;
                 h->column = column;
@@ -257,27 +287,10 @@ static int match(search *s, const run *runs, int count, float column, int slant)
                 h->id = (int16_t)id;
                 h->open_top = above > 2 * unit + slack || upper->start <= 0.0f;
                 h->open_bottom = below > 2 * unit + slack || lower->end >= (float)(rows - 1);
-                h->slant = (int8_t)slant;
                 h->contrast = (uint8_t)(dimmest - brightest);
-                found++;
             }
         }
     }
-    return found;
-}
-
-/* Codes among the runs of one column, with and without those that only shallow valleys part. */
-static int match_near(search *s, const uint8_t *signal, int rows, run *runs, float column,
-                      int slant)
-{
-    int n = find_runs(signal, rows, runs);
-    if (n < 3)
-        return 0;
-    int hits = match(s, runs, n, column, slant);
-    int left = smooth_runs(runs, n, runs + MOST_RUNS);
-    if (left < n && left >= 3)
-        hits += match(s, runs + MOST_RUNS, left, column, slant);
-    return hits;
 }
 
 /* How badly the segments' light, read off its running sum, fits any code of that place and size:
@@ -320,64 +333,85 @@ static float comb(const float *sum, int rows, float top, float unit, int bits, i
     return rest / (step * step * (float)segments);
 }
 
-/* Far codes: colour is too blurred there to part the segments, brightness is not. Where a column
- * has colour for a short stretch, all places and sizes of a code are tried on its brightness. */
-static int match_far(search *s, const uint8_t *signal, int rows, int x, const int *shift,
-                     int slant)
+/* The place and size of a code that fits best near a first guess. */
+typedef struct {
+    float rest, top, unit, contrast;
+    int id;
+} fit;
+
+static void try_codes(const float *sum, int rows, int bits, float middle, float reach, float least,
+                      float most, float fineness, fit *best)
 {
-    float sum[SHORT_STRETCH + 2 * BESIDE + 2];
-    int hits = 0, y = 0;
-    while (y < rows) {
-        uint64_t eight;
-        while (y + 8 <= rows && (memcpy(&eight, signal + y, 8), eight == 0))
-            y += 8;
-        while (y < rows && signal[y] < LEAST_STEP)
-            y++;
-        int from = y, last = y;
-        for (; y < rows && y - last <= GAP; y++)
-            if (signal[y] >= LEAST_STEP)
-                last = y;
-        int height = last - from + 1;
-        if (from >= rows || height > SHORT_STRETCH || height < 9 * SHORTEST)
-            continue;
-        int first = from < BESIDE ? 0 : from - BESIDE;
-        int end = last + BESIDE + 1 < rows ? last + BESIDE + 1 : rows;
-        fill_brightness(s, x, shift, first, end, sum);
-        for (int b = 0; b < s->n_bits; b++) {
-            int bits = s->bits[b], id = 0, best_id = 0;
-            float segments = (float)(2 * bits + 5), best = MOST_REST, best_top = 0, best_unit = 0;
-            float step = 0, best_step = 0;
-            float least = ((float)height - 8) / segments, most = ((float)height + 2) / segments;
-            float middle = (float)(from - first) + (float)height / 2;
-            least = least < (float)SHORTEST ? (float)SHORTEST : least;
-            for (float unit = least; unit <= most; unit += unit < 2 ? 0.04f : 0.02f * unit) {
-                float reach = 1.5f + 0.3f * unit;
-                for (float off = -reach; off <= reach; off += 0.5f) {
-                    float top = middle + off - unit * segments / 2;
-                    float rest = comb(sum, end - first, top, unit, bits, &id, &step);
-                    if (rest < best) {
-                        best = rest;
-                        best_id = id;
-                        best_top = top;
-                        best_unit = unit;
-                        best_step = step;
-                    }
-                }
-            }
-            if (best_id == 0 || s->n_hits >= MOST_HITS)
-                continue;
-            float top = best_top + 2 * best_unit + (float)first - 0.5f;
-            s->hits[s->n_hits++] = (hit){.column = (float)x,
-                                         .top = top,
-                                         .bottom = top + (segments - 4) * best_unit,
-                                         .bits = (int16_t)bits,
-                                         .id = (int16_t)best_id,
-                                         .slant = (int8_t)slant,
-                                         .contrast = (uint8_t)best_step};
-            hits++;
+    float segments = (float)(2 * bits + 5);
+    for (float unit = least; unit <= most; unit += fineness / segments) {
+        for (float off = -reach; off <= reach; off += fineness) {
+            fit one = {.top = middle + off - unit * segments / 2, .unit = unit};
+            one.rest = comb(sum, rows, one.top, unit, bits, &one.id, &one.contrast);
+            if (one.rest < best->rest)
+                *best = one;
         }
     }
-    return hits;
+}
+
+/* Far codes: colour is too blurred there to part the segments, brightness is not. Where a column
+ * has colour for a short stretch, all places and sizes of a code are tried on its brightness. */
+static void match_far(search *s, const uint8_t *signal, int first, int last, int x)
+{
+    float sum[SHORT_STRETCH + 2 * BESIDE + 2];
+    int y = first, rows = s->picture->rows;
+    while (y <= last) {
+        while (y <= last && signal[y] < LEAST_STEP)
+            y++;
+        int from = y, end = y, peak = 0;
+        for (; y <= last && y - end <= GAP; y++)
+            if (signal[y] >= LEAST_STEP) {
+                end = y;
+                peak = signal[y] > peak ? signal[y] : peak;
+            }
+        int height = end - from + 1;
+        if (from > last || height > SHORT_STRETCH || height < 9 * SHORTEST || peak < 2 * LEAST_STEP)
+            continue;
+        int top = from < BESIDE ? 0 : from - BESIDE;
+        int bottom = end + BESIDE + 1 < rows ? end + BESIDE + 1 : rows;
+        fill_brightness(s, x, top, bottom, sum);
+        for (int b = 0; b < s->n_bits; b++) {
+            int bits = s->bits[b];
+            float segments = (float)(2 * bits + 5), middle = (float)(from - top) + (float)height / 2;
+            float least = ((float)height - 8) / segments, most = ((float)height + 2) / segments;
+            fit best = {.rest = ROUGH_REST};
+            least = least < (float)SHORTEST ? (float)SHORTEST : least;
+            try_codes(sum, bottom - top, bits, middle, 1.5f + 0.3f * most, least, most, 1.0f, &best);
+            if (best.rest >= ROUGH_REST)
+                continue;
+            middle = best.top + best.unit * segments / 2;
+            float apart = 0.75f / segments;
+            try_codes(sum, bottom - top, bits, middle, 0.5f, best.unit - apart, best.unit + apart,
+                      0.25f, &best);
+            if (best.rest >= MOST_REST || best.id == 0 || s->n_hits >= MOST_HITS)
+                continue;
+            float begin = best.top + 2 * best.unit + (float)top - 0.5f;
+            s->hits[s->n_hits++] = (hit){.column = (float)x,
+                                         .top = begin,
+                                         .bottom = begin + (segments - 4) * best.unit,
+                                         .bits = (int16_t)bits,
+                                         .id = (int16_t)best.id,
+                                         .contrast = (uint8_t)best.contrast};
+        }
+    }
+}
+
+/* Codes in one column: near ones among its runs, with and without noise; far ones. */
+static void look_at(search *s, const uint8_t *signal, int first, int last, int x, run *runs)
+{
+    int n = find_runs(signal, s->picture->rows, runs);
+    if (n >= 3) {
+        match(s, runs, n, (float)x);
+        int left = smooth_runs(runs, n, runs + MOST_RUNS);
+        if (left < n && left >= 3)
+            match(s, runs + MOST_RUNS, left, (float)x);
+    }
+    if (s->task->low >= 0 && s->picture->channels == 3)
+        match_far(s, signal, first, last, x);
 }
 
 /* Columns whose codes begin and end at the same height become one candidate. */
@@ -385,14 +419,11 @@ typedef struct {
     int first, last_hit, count;
     float left, right, last_column;
     int16_t bits;
-    int8_t slant;
 } group;
 
 static int by_column(const void *a, const void *b)
 {
     const hit *x = a, *y = b;
-    if (x->slant != y->slant)
-        return x->slant - y->slant;
     if (x->column != y->column)
         return x->column < y->column ? -1 : 1;
     return x->top < y->top ? -1 : x->top > y->top;
@@ -414,7 +445,6 @@ static int by_value(const void *a, const void *b)
 
 static int gather(search *s, eye_candidate *found)
 {
-    static const double lean_of[] = {-STEEP, 0.0, STEEP};
     group *groups = malloc(sizeof *groups * MOST_GROUPS);
     int *owner = malloc(sizeof *owner * (size_t)(s->n_hits + 1));
     float *values = malloc(sizeof *values * (size_t)(2 * s->n_hits + 2));
@@ -432,7 +462,7 @@ static int gather(search *s, eye_candidate *found)
         for (int g = n_groups - 1; g >= 0; g--) {
             group *one = groups + g;
             const hit *other = s->hits + one->last_hit;
-            if (one->bits == h->bits && one->slant == h->slant &&
+            if (one->bits == h->bits &&
                 h->column - one->last_column <= 2 * APART && fabsf(h->top - other->top) <= room &&
                 fabsf(h->bottom - other->bottom) <= room) {
                 one->last_hit = i;
@@ -443,7 +473,7 @@ static int gather(search *s, eye_candidate *found)
             }
         }
         if (owner[i] < 0 && n_groups < MOST_GROUPS) {
-            groups[n_groups] = (group){i, i, 1, h->column, h->column, h->column, h->bits, h->slant};
+            groups[n_groups] = (group){i, i, 1, h->column, h->column, h->column, h->bits};
             owner[i] = n_groups++;
         }
     }
@@ -465,14 +495,10 @@ static int gather(search *s, eye_candidate *found)
         }
         qsort(values, (size_t)n, sizeof *values, by_value);
         qsort(values + s->n_hits, (size_t)n, sizeof *values, by_value);
-        double lean = lean_of[groups[g].slant + 1];
-        double row = (values[n / 2] + values[s->n_hits + n / 2]) / 2;
         all[g] = (eye_candidate){
             .bits = groups[g].bits,
             .id = best,
-            .column = (groups[g].left + groups[g].right) / 2 +
-                      lean * (row - (s->picture->rows - 1) / 2.0),
-            .lean = lean,
+            .column = (groups[g].left + groups[g].right) / 2,
             .top = values[n / 2],
             .bottom = values[s->n_hits + n / 2],
             .evidence = contrast,
@@ -501,47 +527,16 @@ done:
     return n_found;
 }
 
-/* One look along columns that slant by ``slant`` * STEEP. ``wanted`` says, one flag per block, which
- * blocks are looked at; a block that may hold more than was found is flagged again. */
-static void look(search *s, int slant, const uint8_t *wanted, uint8_t *again, uint8_t *signal,
-                 int rows_padded, int *shift, run *runs)
-{
-    int columns = s->picture->columns, rows = s->picture->rows;
-    for (int y = 0; y < rows; y++)
-        shift[y] = (int)lround(slant * STEEP * (y - (rows - 1) / 2.0));
-    for (int block = 0; block * BLOCK * APART < columns; block++) {
-        if (!wanted[block])
-            continue;
-        int first = block * BLOCK * APART;
-        int count = (columns - first + APART - 1) / APART;
-        count = count > BLOCK ? BLOCK : count;
-        fill(s, first, count, shift, signal, rows_padded);
-        int found = 0;
-        for (int c = 0; c < count; c++) {
-            const uint8_t *column = signal + c * rows_padded;
-            int x = first + APART * c;
-            int hits = match_near(s, column, rows, runs, (float)x, slant);
-            if (s->task->low >= 0 && s->picture->channels == 3)
-                hits += match_far(s, column, rows, x, shift, slant);
-            found += hits > 0;
-        }
-        again[block] = found == 0;
-    }
-}
-
 /* The candidates of a picture, the clearest first; -1 where there is no memory. */
 int eye_search(const eye_picture *picture, const eye_task *task, eye_candidate *found)
 {
+    int columns = (picture->columns + APART - 1) / APART, n = -1;
     int rows_padded = (picture->rows + 15) / 16 * 16;
-    int blocks = picture->columns / (BLOCK * APART) + 1;
     search *s = malloc(sizeof *s);
+    extent *extents = malloc(sizeof *extents * (size_t)columns);
     uint8_t *signal = malloc((size_t)rows_padded * BLOCK);
-    int *shift = malloc(sizeof *shift * (size_t)picture->rows);
     run *runs = malloc(sizeof *runs * 2 * MOST_RUNS);
-    uint8_t *flags = malloc((size_t)blocks * 3);
-    int n = -1;
-    if (s && signal && shift && runs && flags) {
-        uint8_t *all = flags, *again = flags + blocks, *unused = flags + 2 * blocks;
+    if (s && extents && signal && runs) {
         s->picture = picture;
         s->task = task;
         s->n_hits = s->n_bits = 0;
@@ -551,17 +546,28 @@ int eye_search(const eye_picture *picture, const eye_task *task, eye_candidate *
                     s->bits[s->n_bits++] = bits;
                     break;
                 }
-        memset(all, 1, (size_t)blocks);
-        memset(again, 0, (size_t)blocks);
-        look(s, 0, all, again, signal, rows_padded, shift, runs);
-        look(s, -1, again, unused, signal, rows_padded, shift, runs);
-        look(s, 1, again, unused, signal, rows_padded, shift, runs);
+        survey(s, extents);
+        for (int c = 0; c < columns; c++) {
+            int first = c, top = picture->rows, bottom = -1;
+            for (; c < columns && c - first < BLOCK && extents[c].count >= LEAST_COLOURED; c++) {
+                top = extents[c].first < top ? extents[c].first : top;
+                bottom = extents[c].last > bottom ? extents[c].last : bottom;
+            }
+            if (c == first)
+                continue;
+            top = top > APART ? top - APART : 0;
+            bottom = bottom + APART < picture->rows ? bottom + APART : picture->rows - 1;
+            fill(s, first, c - first, top, bottom, signal, rows_padded);
+            for (int k = first; k < c; k++)
+                look_at(s, signal + (ptrdiff_t)(k - first) * rows_padded, top, bottom, APART * k,
+                        runs);
+            c--;
+        }
         n = gather(s, found);
     }
     free(s);
+    free(extents);
     free(signal);
-    free(shift);
     free(runs);
-    free(flags);
     return n;
 }

@@ -110,12 +110,12 @@ static double energy(const float *values, int n)
     return sum;
 }
 
-/* The lean near ``guess`` under which the difference stands out most. */
-static double find_lean(const band *bands, int n, int columns, int step, double row, double guess,
-                        double length, double wide)
+/* The lean under which the difference stands out most. */
+static double find_lean(const band *bands, int n, int columns, int step, double row, double length,
+                        double wide)
 {
     float values[EYE_MOST_COLUMNS];
-    double best = -1, best_lean = guess;
+    double best = -1, best_lean = 0;
     double apart = 0.4 * wide / length;
     int reach = (int)ceil(STEEPEST / apart);
     if (reach > 12)
@@ -238,7 +238,7 @@ int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candida
     int n = fill_bands(p, task, c, code, segments, unit, first, step, columns, bands);
     cap_signal(bands, n, columns, (int)lround((c->column - first) / step));
     double row = (c->top + c->bottom) / 2;
-    double lean = find_lean(bands, n, columns, step, row, c->lean, length, wide > 2 ? wide : 2);
+    double lean = find_lean(bands, n, columns, step, row, length, wide > 2 ? wide : 2);
     if (fabs(lean) > STEEPEST)
         return EYE_LEANS;
     difference(bands, n, columns, step, row, lean, 0, out->across);

@@ -23,8 +23,10 @@
 #define SHORT_STRETCH 46  /* rows of colour, with gaps up to GAP, in which brightness is tried alone */
 #define ROUGH_REST 0.15f   /* the same, at whole pixels */
 #define MOST_REST 0.06f   /* mean square that a far code may leave over, of bright - dark */
+#define NEAR 3.3f          /* rows per segment from which on colour parts the segments well */
 #define GAP 22
 #define BESIDE 4          /* rows above and below that take part */
+#define LEAST_PEAK 30     /* grey levels of colour, somewhere in a column that is looked at */
 #define LEAST_COLOURED 3  /* sampled rows of colour in a column that is looked at */
 #define LEAST_STEP 12    /* grey levels; less is noise */
 #define FAINT 0.35        /* share of the peaks beside it below which a run is noise */
@@ -56,6 +58,7 @@ typedef struct {
 /* Which part of which columns has the paint's colour at all. */
 typedef struct {
     int first, last, count; /* rows, both included; how many of the sampled ones */
+    int strong;             /* whether any has much */
 } extent;
 
 /* Every second row of every second column: even the farthest end bar is two rows high. */
@@ -65,16 +68,18 @@ static void survey(const search *s, extent *extents)
     int high = s->task->high, low = s->task->low, columns = (p->columns + APART - 1) / APART;
     int coloured = p->channels == 3 && low >= 0;
     for (int c = 0; c < columns; c++)
-        extents[c] = coloured ? (extent){p->rows, -1, 0} : (extent){0, p->rows - 1, p->rows};
+        extents[c] = coloured ? (extent){p->rows, -1, 0, 0} : (extent){0, p->rows - 1, p->rows, 1};
     for (int y = 0; coloured && y < p->rows; y += APART) {
         const uint8_t *pixel = p->pixels + (ptrdiff_t)y * p->stride;
         for (int c = 0; c < columns; c++, pixel += 3 * APART) {
-            if (6 * pixel[high] - 7 * pixel[low] <= 4 * EYE_FAINTEST)
+            int colour = 6 * pixel[high] - 7 * pixel[low];
+            if (colour <= 4 * EYE_FAINTEST)
                 continue;
             extent *e = extents + c;
             e->first = y < e->first ? y : e->first;
             e->last = y;
             e->count++;
+            e->strong |= colour > 4 * LEAST_PEAK;
         }
     }
 }
@@ -143,11 +148,15 @@ static float edge(const uint8_t *s, int from, int to, int valley, int peak)
 /* The bright runs of one column, top first: the signal's ups and downs larger than a share of it. */
 static int find_runs(const uint8_t *s, int rows, run *runs)
 {
+    int least = 0;
+    for (int y = 0; y < rows; y++)
+        least = s[y] > least ? s[y] : least;
+    least = least / 10 > LEAST_STEP ? least / 10 : LEAST_STEP;
     int count = 0, y = 0;
     int valley = 0, valley_at = 0, before = 0; /* the last peak */
     int peaks[MOST_RUNS], valleys[MOST_RUNS + 1], places[MOST_RUNS + 1];
     while (count < MOST_RUNS) {
-        int rise = before / 4 > LEAST_STEP ? before / 4 : LEAST_STEP;
+        int rise = before / 4 > least ? before / 4 : least;
         for (; y < rows; y++) { /* dark: wait for a rise */
             if (s[y] == 0) {
                 uint64_t eight = 0;
@@ -171,7 +180,7 @@ static int find_runs(const uint8_t *s, int rows, run *runs)
             break;
         int peak = s[y], peak_at = y;
         for (; y < rows; y++) { /* bright: wait for a fall */
-            int fall = peak / 4 > LEAST_STEP ? peak / 4 : LEAST_STEP;
+            int fall = peak / 4 > least ? peak / 4 : least;
             if (s[y] > peak) {
                 peak = s[y];
                 peak_at = y;
@@ -244,9 +253,15 @@ static void match(search *s, const run *runs, int count, float column)
         int bits = s->bits[b];
         float inner = (float)(2 * bits + 1);
         for (int i = 0; i + 2 < count; i++) {
+            float most = runs[i].start <= 0 ? 1e9f : inner * (runs[i].end - runs[i].start + (float)(FRAYED + ROUNDING)) /
+                         (float)(2 - SLACK);
+            if (most < inner * (float)SHORTEST)
+                continue; /* too short for an end bar */
             for (int ones = 1; ones <= bits && i + ones + 1 < count; ones++) {
                 const run *upper = runs + i, *lower = runs + i + ones + 1;
                 float top = upper->end, unit = (lower->start - top) / inner;
+                if (lower->start - top > most)
+                    break;
                 if (unit < SHORTEST)
                     continue;
                 float slack = (float)SLACK * unit + (float)ROUNDING;
@@ -355,7 +370,7 @@ static void try_codes(const float *sum, int rows, int bits, float middle, float 
 
 /* Far codes: colour is too blurred there to part the segments, brightness is not. Where a column
  * has colour for a short stretch, all places and sizes of a code are tried on its brightness. */
-static void match_far(search *s, const uint8_t *signal, int first, int last, int x)
+static void match_far(search *s, const uint8_t *signal, int first, int last, int x, int known)
 {
     float sum[SHORT_STRETCH + 2 * BESIDE + 2];
     int y = first, rows = s->picture->rows;
@@ -370,6 +385,15 @@ static void match_far(search *s, const uint8_t *signal, int first, int last, int
             }
         int height = end - from + 1;
         if (from > last || height > SHORT_STRETCH || height < 9 * SHORTEST || peak < 2 * LEAST_STEP)
+            continue;
+        int seen = 0;
+        for (int i = known; i < s->n_hits && !seen; i++) {
+            const hit *h = s->hits + i;
+            float unit = (h->bottom - h->top) / (float)(2 * h->bits + 1);
+            seen = unit > NEAR && (float)from > h->top - 3 * unit &&
+                   (float)end < h->bottom + 3 * unit;
+        }
+        if (seen)
             continue;
         int top = from < BESIDE ? 0 : from - BESIDE;
         int bottom = end + BESIDE + 1 < rows ? end + BESIDE + 1 : rows;
@@ -403,7 +427,7 @@ static void match_far(search *s, const uint8_t *signal, int first, int last, int
 /* Codes in one column: near ones among its runs, with and without noise; far ones. */
 static void look_at(search *s, const uint8_t *signal, int first, int last, int x, run *runs)
 {
-    int n = find_runs(signal, s->picture->rows, runs);
+    int n = find_runs(signal, s->picture->rows, runs), known = s->n_hits;
     if (n >= 3) {
         match(s, runs, n, (float)x);
         int left = smooth_runs(runs, n, runs + MOST_RUNS);
@@ -411,7 +435,7 @@ static void look_at(search *s, const uint8_t *signal, int first, int last, int x
             match(s, runs + MOST_RUNS, left, (float)x);
     }
     if (s->task->low >= 0 && s->picture->channels == 3)
-        match_far(s, signal, first, last, x);
+        match_far(s, signal, first, last, x, known);
 }
 
 /* Columns whose codes begin and end at the same height become one candidate. */
@@ -549,7 +573,9 @@ int eye_search(const eye_picture *picture, const eye_task *task, eye_candidate *
         survey(s, extents);
         for (int c = 0; c < columns; c++) {
             int first = c, top = picture->rows, bottom = -1;
-            for (; c < columns && c - first < BLOCK && extents[c].count >= LEAST_COLOURED; c++) {
+            for (; c < columns && c - first < BLOCK && extents[c].strong &&
+                   extents[c].count >= LEAST_COLOURED;
+                 c++) {
                 top = extents[c].first < top ? extents[c].first : top;
                 bottom = extents[c].last > bottom ? extents[c].last : bottom;
             }

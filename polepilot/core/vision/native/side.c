@@ -9,7 +9,7 @@
 #include <math.h>
 #include <string.h>
 
-#define CELLS 20
+#define CELLS 12
 #define ROUNDS 6
 #define LEVELS 3
 #define PARAMETERS 6 /* levels, middle, blur, half width */
@@ -19,20 +19,21 @@
 /* One column of the model: basis of the levels and derivatives; returns the prediction. */
 static double model_column(double x, double size, const double *guess, int flat, double *row)
 {
-    double middle = guess[3], blur = guess[4], half = guess[5];
+    double middle = guess[3], sharp = 1 / guess[4], half = guess[5];
+    double weight = 2 * half / (CELLS * size);
     memset(row, 0, sizeof(double) * PARAMETERS);
     double by_middle = 0, by_blur = 0, by_half = 0, sum = 0;
     for (int i = 0; i < CELLS; i++) {
         double u = (2 * i + 1.0) / CELLS - 1;
         double place = middle + half * u;
-        double z0 = (x - size / 2 - place) / blur, z1 = (x + size / 2 - place) / blur;
+        double z0 = (x - size / 2 - place) * sharp, z1 = (x + size / 2 - place) * sharp;
         if (z1 < -5 || z0 > 5)
             continue;
         double b0 = eye_bell(z0), b1 = eye_bell(z1);
-        double kernel = (eye_cumulative(z1) - eye_cumulative(z0)) / size * (2 * half / CELLS);
+        double kernel = (eye_cumulative(z1) - eye_cumulative(z0)) * weight;
         double rise = sqrt(1 - u * u);
         double level = guess[0] + guess[1] * u + (flat ? 0 : guess[2] * rise);
-        double by_place = -(b1 - b0) / (blur * size) * (2 * half / CELLS);
+        double by_place = (b0 - b1) * weight * sharp;
         row[0] += kernel;
         row[1] += kernel * u;
         if (!flat)
@@ -40,7 +41,7 @@ static double model_column(double x, double size, const double *guess, int flat,
         sum += level * kernel;
         by_middle += level * by_place;
         by_half += level * (by_place * u + kernel / half);
-        by_blur += level * -(b1 * z1 - b0 * z0) / (blur * size) * (2 * half / CELLS);
+        by_blur += level * (b0 * z0 - b1 * z1) * weight * sharp;
     }
     row[3] = by_middle;
     row[4] = by_blur;
@@ -137,7 +138,7 @@ int eye_fit_side(const eye_picture *p, const eye_upright *u, double half, int fl
         guess[5] += right[5] < -0.2 * half ? -0.2 * half : right[5] > 0.2 * half ? 0.2 * half : right[5];
         if (!(fabs(guess[3] - u->column) <= half + 2) || !(guess[5] > 0.4 * half))
             return EYE_WRONG_WIDTH;
-        if (fabs(move) < 0.01 && round > 1)
+        if (fabs(move) < 0.015 && round > 0)
             round = ROUNDS - 1;
     }
     double inverse[PARAMETERS] = {0, 0, 0, 1, 0, 0};

@@ -94,10 +94,15 @@ static void difference(const band *bands, int n, int columns, int step, double r
         float part = (float)(shift - whole), weight = (float)bands[b].weight;
         float near = weight * (1 - part), far = weight * part;
         const float *of = light ? bands[b].light : bands[b].signal;
-        for (int c = 0; c < columns; c++) {
-            int at = clamp(c + whole, 0, columns - 2);
-            out[c] += near * of[at] + far * of[at + 1];
-        }
+        int from = whole < 0 ? -whole : 0, to = whole < 0 ? columns : columns - whole;
+        from = from > columns ? columns : from;
+        to = to > columns - 1 - whole ? columns - 1 - whole : to;
+        for (int c = 0; c < from; c++) /* beyond what was looked at: as its edge */
+            out[c] += weight * of[0];
+        for (int c = from; c < to; c++)
+            out[c] += near * of[c + whole] + far * of[c + whole + 1];
+        for (int c = to > from ? to : from; c < columns; c++)
+            out[c] += weight * of[columns - 1];
     }
 }
 
@@ -190,7 +195,7 @@ static void fill_profile(const eye_picture *p, const eye_task *task, double top,
     out->first = first - 0.5;
     out->channels = p->channels;
     double half = out->half_window;
-    int step = (int)(half / 4);
+    int step = (int)(half / 2.5);
     step = step < 1 ? 1 : step;
     for (int r = 0; r < rows; r++) {
         float light = 0, channel[3] = {0, 0, 0}, total = 0;

@@ -10,8 +10,8 @@
 #define SAME 0.06       /* the same, of one thing that goes on beside the strip */
 #define ASLANT 0.6      /* segments */
 #define UNLIKE 2.5      /* times nearer to the other black than to what is beside it: paint */
-#define ROWS 3
-#define COLUMNS 3
+#define ROWS 2
+#define COLUMNS 2
 
 /* Mean light beside a segment; 0 where that lies outside the picture. */
 static int beside(const eye_picture *p, double row, double reach, double column, double step,
@@ -21,11 +21,11 @@ static int beside(const eye_picture *p, double row, double reach, double column,
     for (int c = 0; c < p->channels; c++)
         light[c] = 0;
     for (int i = 0; i < ROWS; i++) {
-        int y = (int)lround(row + reach * (i - 1));
+        int y = (int)floor(row + reach * (2 * i - 1) + 0.5);
         if (y < 0 || y >= p->rows)
             continue;
         for (int k = 0; k < COLUMNS; k++) {
-            int x = (int)lround(column + step * k);
+            int x = (int)floor(column + step * k + 0.5);
             if (x < 0 || x >= p->columns)
                 continue;
             const uint8_t *pixel = p->pixels + (ptrdiff_t)y * p->stride + x * p->channels;
@@ -74,7 +74,8 @@ int eye_covered(const eye_picture *p, const eye_upright *u, const eye_scale *sca
         int sign = way == 0 ? -1 : 1;
         for (int i = 0; i < segments; i++) {
             clear[way][i] = same[way][i] = 0;
-            for (int tilt = -1; tilt <= 1; tilt++) { /* what lies across may lie aslant */
+            int bit = code[i] == '0' && i % 2 == 1;
+            for (int tilt = -bit; tilt <= bit; tilt++) { /* what lies across may lie aslant */
                 double place = i + 0.5 + ASLANT * tilt - segments / 2.0;
                 double row = scale->middle + scale->unit * place;
                 double column = side->column + u->lean * (row - u->row) + sign * gap;

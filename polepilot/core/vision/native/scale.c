@@ -25,7 +25,7 @@
 #define MOST_LAG 3
 #define ASTRAY 2.5      /* times the rest that the other channel leaves */
 #define USUAL_NOISE 0.1 /* rest, of bright - dark, that says nothing about a channel */
-#define SETTLED 0.01     /* rows by which boundaries still move when a fit may end */
+#define SETTLED 0.02     /* rows by which boundaries still move when a fit may end */
 #define RIDGE 1e-9
 
 typedef struct {
@@ -409,30 +409,28 @@ int eye_segment_levels(const eye_upright *u, const eye_scale *scale, int segment
     double half = segments / 2.0, place[MOST];
     for (int k = 0; k <= segments; k++)
         place[k] = row_of(guess, k - half);
+    int passed = 0;
+    double reach = 5 * scale->blur;
     for (int i = 0; i < u->rows; i++) {
         double upper = u->first + i * u->bin, lower = upper + u->bin;
         if (lower < place[0] - scale->unit || upper > place[segments] + scale->unit)
             continue;
-        double share[MOST] = {0}, before = 1;
-        int first = -1, last = 0;
-        for (int k = 0; k <= segments; k++) {
+        while (passed <= segments && place[passed] < upper - reach)
+            passed++;
+        /* Boundary k lies between segments k - 1 and k; 0 is what is above, n - 1 what is below. */
+        double share[MOST], before = 1;
+        int last = passed;
+        for (int k = passed; k <= segments && place[k] < lower + reach; k++) {
             double step = step_at(upper, lower, place[k], scale->blur).step;
             share[k] = before - step;
             before = step;
-            if (share[k] > 1e-4) {
-                first = first < 0 ? k : first;
-                last = k;
-            }
+            last = k + 1;
         }
-        share[n - 1] = before;
-        if (before > 1e-4)
-            last = n - 1;
-        if (first < 0)
-            first = n - 1;
-        for (int a = first; a <= last; a++) {
+        share[last] = before;
+        for (int a = passed; a <= last; a++) {
             for (int c = 0; c < 3; c++)
                 right[a * 3 + c] += share[a] * u->channel[i][c];
-            for (int b = first; b <= last; b++)
+            for (int b = passed; b <= a; b++)
                 matrix[a * n + b] += share[a] * share[b];
         }
     }

@@ -10,7 +10,8 @@
 #include <string.h>
 
 #define BLOCK 16          /* columns that are filled together */
-#define APART 2           /* every second column is looked at */
+#define APART 2           /* every second column is looked at, */
+#define ROWS_APART 3      /* and every third row of it, for colour */
 #define MOST_RUNS 384     /* bright runs in one column */
 #define MOST_HITS 3000    /* columns with a code; a picture full of stripes has no landmark */
 #define MOST_GROUPS 400
@@ -27,7 +28,7 @@
 #define GAP 22
 #define BESIDE 4          /* rows above and below that take part */
 #define LEAST_PEAK 30     /* grey levels of colour, somewhere in a column that is looked at */
-#define LEAST_COLOURED 3  /* sampled rows of colour in a column that is looked at */
+#define LEAST_COLOURED 2  /* sampled rows of colour in a column that is looked at */
 #define LEAST_STEP 12    /* grey levels; less is noise */
 #define FAINT 0.35        /* share of the peaks beside it below which a run is noise */
 #define SHALLOW 0.45      /* share of the peaks beside it above which a valley is texture or noise */
@@ -61,7 +62,7 @@ typedef struct {
     int strong;             /* whether any has much */
 } extent;
 
-/* Every second row of every second column: even the farthest end bar is two rows high. */
+/* Every third row of every second column: even the farthest end bar is nearly three rows high. */
 static void survey(const search *s, extent *extents)
 {
     const eye_picture *p = s->picture;
@@ -69,7 +70,7 @@ static void survey(const search *s, extent *extents)
     int coloured = p->channels == 3 && low >= 0;
     for (int c = 0; c < columns; c++)
         extents[c] = coloured ? (extent){p->rows, -1, 0, 0} : (extent){0, p->rows - 1, p->rows, 1};
-    for (int y = 0; coloured && y < p->rows; y += APART) {
+    for (int y = 0; coloured && y < p->rows; y += ROWS_APART) {
         const uint8_t *pixel = p->pixels + (ptrdiff_t)y * p->stride;
         for (int c = 0; c < columns; c++, pixel += 3 * APART) {
             int colour = 6 * pixel[high] - 7 * pixel[low];
@@ -581,8 +582,9 @@ int eye_search(const eye_picture *picture, const eye_task *task, eye_candidate *
             }
             if (c == first)
                 continue;
-            top = top > APART ? top - APART : 0;
-            bottom = bottom + APART < picture->rows ? bottom + APART : picture->rows - 1;
+            top = top > 2 * ROWS_APART ? top - 2 * ROWS_APART : 0;
+            bottom = bottom + 2 * ROWS_APART < picture->rows ? bottom + 2 * ROWS_APART
+                                                             : picture->rows - 1;
             fill(s, first, c - first, top, bottom, signal, rows_padded);
             for (int k = first; k < c; k++)
                 look_at(s, signal + (ptrdiff_t)(k - first) * rows_padded, top, bottom, APART * k,

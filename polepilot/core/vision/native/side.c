@@ -9,7 +9,8 @@
 #include <math.h>
 #include <string.h>
 
-#define CELLS 12
+#define CELLS 8
+#define FINE_CELLS 24
 #define ROUNDS 6
 #define LEVELS 3
 #define PARAMETERS 6 /* levels, middle, blur, half width */
@@ -53,8 +54,8 @@ static double model_column(double x, double size, const double *guess, int flat,
 static double front_of(const eye_upright *u, const double *guess)
 {
     double total = 0, sum = 0;
-    for (int i = 0; i < 4 * CELLS; i++) {
-        double at = (2 * i + 1.0) / (4 * CELLS) - 1;
+    for (int i = 0; i < FINE_CELLS; i++) {
+        double at = (2 * i + 1.0) / FINE_CELLS - 1;
         double offset = guess[3] + guess[5] * at - u->column;
         double rise = sqrt(1 - at * at);
         double light = guess[0] + guess[1] * at + guess[2] * rise;

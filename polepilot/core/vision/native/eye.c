@@ -10,6 +10,7 @@
 #define USUAL_SIDE_NOISE 0.06  /* rms rest of the fit across, of its peak */
 #define USUAL_PITCH 0.035      /* radians between camera and pole */
 #define USUAL_TINT 0.12
+#define SURE 4e-4              /* share of the unit: no second fit makes it better */
 #define FEW_ROWS 6.0           /* per segment: JPEG blurs colour by up to as much */
 #define MOST_BLUR 0.5          /* rows, and three tenths of a segment */
 #define SHORTEST 1.25          /* rows per segment */
@@ -111,7 +112,8 @@ static int examine(const eye_picture *picture, const eye_task *task, eye_candida
             sharp = 1;
             reason = read_strip(task, candidate, &upright, sharp, &id, &scale, levels, out);
         }
-        if (reason == EYE_READ && !sharp && picture->channels == 3)
+        if (reason == EYE_READ && !sharp && picture->channels == 3 &&
+            scale.unit_sigma > SURE)
             eye_refine_scale(&upright, task, out->code, candidate, &scale);
         if (id == before)
             break;

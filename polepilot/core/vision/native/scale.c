@@ -66,8 +66,8 @@ static double row_of(const double *guess, double place)
  * cumulative function over them, and how that changes. */
 static inline slope step_at(double upper, double lower, double place, double blur)
 {
-    double z0 = (upper - place) / blur, z1 = (lower - place) / blur;
-    double size = 1 / (lower - upper);
+    double sharp = 1 / blur, size = 1 / (lower - upper);
+    double z0 = (upper - place) * sharp, z1 = (lower - place) * sharp;
     if (z1 < -5)
         return (slope){0, 0, 0};
     if (z0 > 5)
@@ -145,16 +145,20 @@ static double model_row(const code_shape *shape, const layout *at, const double 
     return sum;
 }
 
-static void add_row(double *normal, double *right, const double *row, int first, int n, double rest,
-                    double weight)
+/* Adds a row to the normal equations; most of its entries are nought. */
+static void add_row(double *normal, double *right, const double *row, double rest, double weight)
 {
-    for (int i = first; i < n; i++) {
-        if (row[i] == 0)
-            continue;
-        double scaled = row[i] * weight;
-        right[i] += scaled * rest;
-        for (int j = first; j <= i; j++)
-            normal[i * PARAMETERS + j] += scaled * row[j];
+    int used[PARAMETERS], n = 0;
+    for (int i = 0; i < PARAMETERS; i++) {
+        used[n] = i;
+        n += row[i] != 0;
+    }
+    for (int a = 0; a < n; a++) {
+        double scaled = row[used[a]] * weight;
+        double *line = normal + used[a] * PARAMETERS;
+        right[used[a]] += scaled * rest;
+        for (int b = 0; b <= a; b++)
+            line[used[b]] += scaled * row[used[b]];
     }
 }
 
@@ -238,7 +242,7 @@ static int fit_channel(const eye_upright *u, const double *light, const char *co
     code_shape shape;
     double guess[PARAMETERS] = {0}, normal[PARAMETERS * PARAMETERS], right[PARAMETERS];
     double row[PARAMETERS];
-    int segments = 2 * candidate->bits + 5, from, to, settled = 0;
+    int segments = 2 * candidate->bits + 5, from, to;
     double unit = (candidate->bottom - candidate->top) / (segments - 4);
     double middle = (candidate->top + candidate->bottom) / 2;
     shape_of(code, segments, &shape);
@@ -269,7 +273,7 @@ static int fit_channel(const eye_upright *u, const double *light, const char *co
                                              &passed, row);
             /* Photon noise: the variance of light grows with the light. */
             double weight = 1 / (fabs(light[i]) + 0.01);
-            add_row(normal, right, row, 0, PARAMETERS, rest, weight);
+            add_row(normal, right, row, rest, weight);
             rests += rest * rest * weight;
             plain += rest * rest;
             left_over[i - from] = rest * sqrt(weight);
@@ -288,8 +292,6 @@ static int fit_channel(const eye_upright *u, const double *light, const char *co
         normal[SAG * PARAMETERS + SAG] += sag_pull;
         right[SAG] -= sag_pull * guess[SAG];
         mirror(normal, RIDGE);
-        if (settled)
-            break;
         double solving[PARAMETERS * PARAMETERS];
         memcpy(solving, normal, sizeof normal);
         if (!eye_solve(solving, right, PARAMETERS, 1))
@@ -308,9 +310,8 @@ static int fit_channel(const eye_upright *u, const double *light, const char *co
         if (!(fabs(guess[MIDDLE] - middle) <= unit + 1) || !(fabs(guess[UNIT] / unit - 1) <= 0.2))
             return EYE_NO_SCALE;
         /* The step after this one would be the square of it, about. */
-        settled = fabs(by_middle) < SETTLED && fabs(by_unit) * segments < SETTLED;
-        if (round == ROUNDS - 2)
-            settled = 1;
+        if (fabs(by_middle) < SETTLED && fabs(by_unit) * segments < SETTLED)
+            break;
     }
     double contrast = guess[1] - guess[3];
     if (!(contrast > 0.002))

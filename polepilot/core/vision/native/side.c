@@ -93,7 +93,7 @@ int eye_fit_side(const eye_picture *p, const eye_upright *u, double half, int fl
         return EYE_NO_CONTRAST;
     guess[0] = 0.6 * peak;
     guess[2] = flat ? 0 : 0.4 * peak;
-    for (int round = 0; round <= ROUNDS; round++) {
+    for (int round = 0; round < ROUNDS; round++) {
         memset(normal, 0, sizeof normal);
         memset(right, 0, sizeof right);
         double rests = 0;
@@ -124,8 +124,6 @@ int eye_fit_side(const eye_picture *p, const eye_upright *u, double half, int fl
         }
         for (int a = 0; a < PARAMETERS; a++)
             normal[a * PARAMETERS + a] *= 1 + 1e-9;
-        if (round == ROUNDS)
-            break;
         double solving[PARAMETERS * PARAMETERS];
         memcpy(solving, normal, sizeof normal);
         if (!eye_solve(solving, right, PARAMETERS, 1))
@@ -140,7 +138,7 @@ int eye_fit_side(const eye_picture *p, const eye_upright *u, double half, int fl
         if (!(fabs(guess[3] - u->column) <= half + 2) || !(guess[5] > 0.4 * half))
             return EYE_WRONG_WIDTH;
         if (fabs(move) < 0.015 && round > 0)
-            round = ROUNDS - 1;
+            break;
     }
     double inverse[PARAMETERS] = {0, 0, 0, 1, 0, 0};
     if (!eye_solve(normal, inverse, PARAMETERS, 1))

@@ -10,8 +10,8 @@
 
 #define MARGIN 1.3      /* segments above and below the code that are kept */
 #define STEEPEST 0.125  /* columns per row: 60 degrees/s, a slow shutter and 2 degrees of roll */
-#define ROWS_A_BAND 4
-#define COLUMNS_ACROSS 9.0 /* more columns than this across the strip are left out */
+#define ROWS_A_BAND 3
+#define COLUMNS_ACROSS 7.0 /* more columns than this across the strip are left out */
 #define LOOKED_AT 0.70  /* share of the half width over which the profile is averaged */
 #define LEAST_SIGNAL 4.0 /* grey levels of bright minus dark */
 #define ROWS_A_UNIT 3.0 /* more rows per segment than this are averaged */

@@ -14,7 +14,7 @@
 #define COLUMNS_ACROSS 7.0 /* more columns than this across the strip are left out */
 #define LOOKED_AT 0.70  /* share of the half width over which the profile is averaged */
 #define LEAST_SIGNAL 4.0 /* grey levels of bright minus dark */
-#define ROWS_A_UNIT 3.0 /* more rows per segment than this are averaged */
+#define ROWS_A_UNIT 2.0 /* more rows per segment than this are averaged */
 
 typedef struct {
     double row;    /* middle */

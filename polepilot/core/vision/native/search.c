@@ -120,6 +120,14 @@ static void fill_brightness(const search *s, int x, int from, int to, float *sum
     }
 }
 
+/* The running sum of the signal of one column. */
+static void fill_colour(const uint8_t *signal, int from, int to, float *sum)
+{
+    sum[0] = 0;
+    for (int y = from; y < to; y++)
+        sum[y - from + 1] = sum[y - from] + (float)signal[y];
+}
+
 /* Where a run's edge lies: from the dark row at ``from`` (level ``valley``) towards ``to``.
  *
  * The edge ends at a shoulder, not at the peak: behind a bar something brighter may go on. */
@@ -369,8 +377,40 @@ static void try_codes(const float *sum, int rows, int bits, float middle, float 
     }
 }
 
-/* Far codes: colour is too blurred there to part the segments, brightness is not. Where a column
- * has colour for a short stretch, all places and sizes of a code are tried on its brightness. */
+/* Tries all places and sizes of a code on the rows from ``top`` to ``bottom`` of one column, of
+ * which ``height`` from ``from`` on have colour; returns how many bits' codes were found. */
+static int comb_column(search *s, const float *sum, int top, int bottom, int from, int height, int x)
+{
+    int found = 0;
+    for (int b = 0; b < s->n_bits && s->n_hits < MOST_HITS; b++) {
+        int bits = s->bits[b];
+        float segments = (float)(2 * bits + 5), middle = (float)(from - top) + (float)height / 2;
+        float least = ((float)height - 8) / segments, most = ((float)height + 2) / segments;
+        fit best = {.rest = ROUGH_REST};
+        least = least < (float)SHORTEST ? (float)SHORTEST : least;
+        try_codes(sum, bottom - top, bits, middle, 1.5f + 0.3f * most, least, most, 1.0f, &best);
+        if (best.rest >= ROUGH_REST)
+            continue;
+        middle = best.top + best.unit * segments / 2;
+        float apart = 0.75f / segments;
+        try_codes(sum, bottom - top, bits, middle, 0.5f, best.unit - apart, best.unit + apart, 0.25f,
+                  &best);
+        if (best.rest >= MOST_REST || best.id == 0)
+            continue;
+        float begin = best.top + 2 * best.unit + (float)top - 0.5f;
+        s->hits[s->n_hits++] = (hit){.column = (float)x,
+                                     .top = begin,
+                                     .bottom = begin + (segments - 4) * best.unit,
+                                     .bits = (int16_t)bits,
+                                     .id = (int16_t)best.id,
+                                     .contrast = (uint8_t)best.contrast};
+        found++;
+    }
+    return found;
+}
+
+/* Far codes: their segments are so short that runs cannot be told apart. Where a column has colour
+ * for a short stretch, all places and sizes of a code are tried. */
 static void match_far(search *s, const uint8_t *signal, int first, int last, int x, int known)
 {
     float sum[SHORT_STRETCH + 2 * BESIDE + 2];
@@ -398,30 +438,12 @@ static void match_far(search *s, const uint8_t *signal, int first, int last, int
             continue;
         int top = from < BESIDE ? 0 : from - BESIDE;
         int bottom = end + BESIDE + 1 < rows ? end + BESIDE + 1 : rows;
+        /* Colour ignores walls and floors; brightness is sharper in pictures that were JPEG. */
+        fill_colour(signal, top, bottom, sum);
+        if (comb_column(s, sum, top, bottom, from, height, x))
+            continue;
         fill_brightness(s, x, top, bottom, sum);
-        for (int b = 0; b < s->n_bits; b++) {
-            int bits = s->bits[b];
-            float segments = (float)(2 * bits + 5), middle = (float)(from - top) + (float)height / 2;
-            float least = ((float)height - 8) / segments, most = ((float)height + 2) / segments;
-            fit best = {.rest = ROUGH_REST};
-            least = least < (float)SHORTEST ? (float)SHORTEST : least;
-            try_codes(sum, bottom - top, bits, middle, 1.5f + 0.3f * most, least, most, 1.0f, &best);
-            if (best.rest >= ROUGH_REST)
-                continue;
-            middle = best.top + best.unit * segments / 2;
-            float apart = 0.75f / segments;
-            try_codes(sum, bottom - top, bits, middle, 0.5f, best.unit - apart, best.unit + apart,
-                      0.25f, &best);
-            if (best.rest >= MOST_REST || best.id == 0 || s->n_hits >= MOST_HITS)
-                continue;
-            float begin = best.top + 2 * best.unit + (float)top - 0.5f;
-            s->hits[s->n_hits++] = (hit){.column = (float)x,
-                                         .top = begin,
-                                         .bottom = begin + (segments - 4) * best.unit,
-                                         .bits = (int16_t)bits,
-                                         .id = (int16_t)best.id,
-                                         .contrast = (uint8_t)best.contrast};
-        }
+        comb_column(s, sum, top, bottom, from, height, x);
     }
 }
 

@@ -10,6 +10,7 @@
 #define USUAL_SIDE_NOISE 0.06  /* rms rest of the fit across, of its peak */
 #define USUAL_PITCH 0.035      /* radians between camera and pole */
 #define USUAL_TINT 0.12
+#define USUAL_SIGMA 0.006      /* of the unit, as a share of it */
 #define SURE 4e-4              /* share of the unit: no second fit makes it better */
 #define FEW_ROWS 6.0           /* per segment: JPEG blurs colour by up to as much */
 #define MOST_BLUR 0.5          /* rows, and three tenths of a segment */
@@ -39,14 +40,16 @@ static double half_width(const eye_task *task, const eye_kind *kind, double unit
 }
 
 /* How badly everything together fits a landmark: squares of what the edges, the sides, the sag and
- * the tint are off, each over what it usually is. Real strips seldom have more than a few. */
+ * the tint are off, and of how vague the scale is, each over what it usually is. Real strips seldom
+ * have more than a few. */
 static double misfit(const eye_strip *strip, double constant)
 {
     double sag = hypot(strip->sag_sigma, USUAL_PITCH * strip->unit / constant);
     double edges = strip->noise / USUAL_NOISE, sides = strip->side_noise / USUAL_SIDE_NOISE;
     double tint = strip->tint > 0 ? strip->tint / USUAL_TINT : 0;
     double bend = strip->sag / (1.5 * sag);
-    return edges * edges + sides * sides + bend * bend + tint * tint;
+    double vague = strip->unit_sigma / USUAL_SIGMA;
+    return edges * edges + sides * sides + bend * bend + tint * tint + vague * vague;
 }
 
 /* Fits and reads a straightened strip; the reason where it is no code. ``id`` is what the search

@@ -11,6 +11,8 @@
 #define MOST_TOLERANCE 0.45
 #define DARKEST_SHARE 0.45 /* of the bright paint's light that black gives back (haze, glare) */
 #define THIN_SHARE 0.35    /* as much more where the strip is hardly a pixel wide */
+#define FULL 0.92          /* light that nearly fills the scale: overexposed */
+#define FULL_SHARE 0.2     /* as much more for black, as bright paint has lost its lead */
 #define LEAST_COLOUR 0.25  /* of the bright paint's light: its brightest channel minus its darkest */
 
 int eye_read(const eye_task *task, double levels[][3], int segments, int channels, double noise,
@@ -70,12 +72,17 @@ int eye_read(const eye_task *task, double levels[][3], int segments, int channel
         *tint = (mean[task->low] - dark[task->low]) / (mean[task->high] - dark[task->high]);
         double high = mean[task->high], low = mean[task->low];
         int other = 3 - task->high - task->low;
-        if (high - low < LEAST_COLOUR * high || mean[other] > 0.95 * high)
+        /* Where the brightest channel has reached the end of its scale the next one catches up. */
+        int full = high > FULL;
+        if (high - low < LEAST_COLOUR * high || (!full && mean[other] > 0.95 * high))
             return EYE_WRONG_COLOUR;
     }
     /* A thin strip is blurred: what is beside it lightens its black. */
     double thin = width < 4 ? (4 - width) / 3 : 0;
-    if (darkest > (DARKEST_SHARE + THIN_SHARE * (thin > 1 ? 1 : thin)) * dimmest)
+    double most = DARKEST_SHARE + THIN_SHARE * (thin > 1 ? 1 : thin);
+    if (mean[channels == 3 ? task->high : 0] > FULL)
+        most += FULL_SHARE;
+    if (darkest > most * dimmest)
         return EYE_NOT_DARK;
     if (sqrt(differ / powers) > 2 * room)
         return EYE_ENDS_DIFFER;

@@ -387,6 +387,7 @@ int eye_refine_scale(const eye_upright *u, const eye_task *task, const char *cod
         return 1;
     }
     out->blur = other.blur < out->blur ? other.blur : out->blur;
+    out->noise = other.noise < out->noise ? other.noise : out->noise;
     double middle_sigma = out->unit_sigma, other_sigma = other.unit_sigma;
     merge(&out->middle, &middle_sigma, other.middle, other_sigma);
     double unit_sigma = out->unit_sigma * out->unit;

@@ -14,12 +14,12 @@
 #define ROWS_APART 3      /* and every third row of it, for colour */
 #define MOST_RUNS 384     /* bright runs in one column */
 #define MOST_HITS 3000    /* columns with a code; a picture full of stripes has no landmark */
-#define MOST_GROUPS 400
+#define RECENT_GROUPS 200 /* that a hit may join: others ended some columns ago */
 #define SHORTEST 1.15     /* rows per segment; shorter ones cannot be told apart */
 #define SLACK 0.28        /* share of a segment by which a run may miss its length or place */
 #define ROUNDING 0.75     /* rows by which it may miss besides */
 #define FRAYED 0.35       /* rows by which a bar may be shorter besides: its end has lost colour */
-#define HALF_LIGHT 0.70   /* half of the light as a share of the grey level, (1/2)^(1/2.2) = 0.73 */
+#define HALF_LIGHT 0.60   /* half of the light as a share of the signal: 0.73 of brightness, 0.5 of colour */
 #define LEAVES_DARK 0.30  /* share of a step above which an edge has begun */
 #define SHORT_STRETCH 46  /* rows of colour, with gaps up to GAP, in which brightness is tried alone */
 #define ROUGH_REST 0.15f   /* the same, at whole pixels */
@@ -492,10 +492,10 @@ static int by_value(const void *a, const void *b)
 
 static int gather(search *s, eye_candidate *found)
 {
-    group *groups = malloc(sizeof *groups * MOST_GROUPS);
+    group *groups = malloc(sizeof *groups * (size_t)(s->n_hits + 1));
     int *owner = malloc(sizeof *owner * (size_t)(s->n_hits + 1));
     float *values = malloc(sizeof *values * (size_t)(2 * s->n_hits + 2));
-    eye_candidate *all = malloc(sizeof *all * MOST_GROUPS);
+    eye_candidate *all = malloc(sizeof *all * (size_t)(s->n_hits + 1));
     int n_groups = 0, n_found = 0;
     if (!groups || !owner || !values || !all) {
         n_found = -1;
@@ -506,7 +506,7 @@ static int gather(search *s, eye_candidate *found)
         const hit *h = s->hits + i;
         float room = 0.5f * (h->bottom - h->top) / (float)(2 * h->bits + 1) + 1.0f;
         owner[i] = -1;
-        for (int g = n_groups - 1; g >= 0; g--) {
+        for (int g = n_groups - 1; g >= 0 && g >= n_groups - RECENT_GROUPS; g--) {
             group *one = groups + g;
             const hit *other = s->hits + one->last_hit;
             if (one->bits == h->bits &&
@@ -519,7 +519,7 @@ static int gather(search *s, eye_candidate *found)
                 break;
             }
         }
-        if (owner[i] < 0 && n_groups < MOST_GROUPS) {
+        if (owner[i] < 0) {
             groups[n_groups] = (group){i, i, 1, h->column, h->column, h->column, h->bits};
             owner[i] = n_groups++;
         }

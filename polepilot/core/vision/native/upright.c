@@ -9,7 +9,7 @@
 #include <string.h>
 
 #define MARGIN 1.3      /* segments above and below the code that are kept */
-#define STEEPEST 0.125  /* columns per row: 60 degrees/s, a slow shutter and 2 degrees of roll */
+#define STEEPEST 0.118  /* columns per row: 60 degrees/s, a slow shutter and 2 degrees of roll */
 #define ROWS_A_BAND 3
 #define COLUMNS_ACROSS 7.0 /* more columns than this across the strip are left out */
 #define LOOKED_AT 0.70  /* share of the half width over which the profile is averaged */

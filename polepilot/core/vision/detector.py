@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
 
 from polepilot.core.landmark import LandmarkKind
 from polepilot.core.observation import Detection, Image
 from polepilot.core.vehicle import Camera
-from polepilot.core.vision.kernel import Kernel, Strip
-from polepilot.core.vision.measure import measure, pitch_of, stands
+from polepilot.core.vision.kernel import REASONS, Kernel, Strip
+from polepilot.core.vision.measure import measure, pitch_of, stands, through_pinhole
+from polepilot.core.vision.paint import ORANGE, Paint
+
+OUT_OF_PLACE = "not where a landmark can be"
+RIVAL = "another reading of this place fits better"
+TWICE = "this number fits better elsewhere"
 
 
 class Detector(Protocol):
@@ -20,48 +26,120 @@ class Detector(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """A landmark, and the strip of the picture that showed it."""
+
+    detection: Detection
+    strip: Strip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rejected:
+    """A strip that looked like a landmark for a moment, and why it is none, in words.
+
+    Of the strip only id, bits, code and place say something, and they may be wrong.
+    """
+
+    strip: Strip
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """All that was thought of one picture; both from left to right."""
+
+    found: tuple[Found, ...]
+    rejected: tuple[Rejected, ...]
+
+
+class _Reading(NamedTuple):
+    """A strip that was read: as the picture shows it, and as a lens without distortion would."""
+
+    seen: Strip
+    ideal: Strip
+    kind: LandmarkKind
+
+    @property
+    def half(self) -> float:
+        """Half of its height, pixels."""
+        return (self.seen.bits + 2.5) * self.seen.unit
+
+
 class LandmarkDetector:
     """Reads every landmark of a picture, near and far, and measures it on linear light.
 
     Args:
-        camera: constant and centre for pictures as they are given; pictures are never resized.
+        camera: constant, centre and lens for pictures as they are given, which are never resized.
         kinds: the ids that exist and what each looks like; anything else is not reported.
+        paint: what their bright segments are painted with. Grey pictures have no colour: in them
+            anything bright and dark that is shaped like a landmark is one.
     """
 
-    def __init__(self, camera: Camera, kinds: Mapping[int, LandmarkKind]) -> None:
+    def __init__(
+        self, camera: Camera, kinds: Mapping[int, LandmarkKind], paint: Paint = ORANGE
+    ) -> None:
         self._camera = camera
+        self._bent = any(camera.distortion)
         self._kinds = dict(kinds)
-        self._kernel = Kernel(self._kinds, camera.constant)
+        self._kernel = Kernel(self._kinds, camera.constant, paint)
 
     def detect(self, image: Image) -> list[Detection]:
         """All landmarks of a picture (rows x columns x 3 BGR, or grey), from left to right."""
-        read = [
-            strip
-            for strip in self._kernel.look(image)
-            if not strip.reason and stands(strip, self._kinds[strip.id], self._camera)
-        ]
-        if not read:
+        read = [self._reading(strip) for strip in self._kernel.look(image) if not strip.reason]
+        best = _best([one for one in read if stands(one.ideal, one.kind, self._camera)])
+        return [found.detection for found in self._measured(best)]
+
+    def examine(self, image: Image) -> Look:
+        """The same landmarks with their strips, and what else was looked at closely."""
+        rejected = []
+        standing = []
+        for strip in self._kernel.look(image):
+            if strip.reason:
+                rejected.append(Rejected(strip, REASONS[strip.reason]))
+                continue
+            one = self._reading(strip)
+            if stands(one.ideal, one.kind, self._camera):
+                standing.append(one)
+            else:
+                rejected.append(Rejected(strip, OUT_OF_PLACE))
+        best = _best(standing)
+        for one in standing:
+            if not any(one is other for other in best):
+                rival = any(_same_place(one, other) for other in best)
+                rejected.append(Rejected(one.seen, RIVAL if rival else TWICE))
+        rejected.sort(key=lambda one: one.strip.column)
+        return Look(tuple(self._measured(best)), tuple(rejected))
+
+    def _reading(self, strip: Strip) -> _Reading:
+        kind = self._kinds[strip.id]
+        ideal = through_pinhole(strip, kind, self._camera) if self._bent else strip
+        return _Reading(strip, ideal, kind)
+
+    def _measured(self, best: Sequence[_Reading]) -> list[Found]:
+        if not best:
             return []
-        best = [(strip, self._kinds[strip.id]) for strip in _best(read)]
-        pitch = pitch_of(best, self._camera)
-        found = [measure(strip, kind, pitch, self._camera) for strip, kind in best]
-        return sorted(found, key=lambda one: one.column)
+        pitch = pitch_of([(one.ideal, one.kind) for one in best], self._camera)
+        found = [
+            Found(measure(one.ideal, one.kind, pitch, self._camera, one.seen), one.seen)
+            for one in best
+        ]
+        return sorted(found, key=lambda one: one.detection.column)
 
 
-def _best(strips: list[Strip]) -> list[Strip]:
-    """One strip per id and place: of rivals, the one that fits best."""
-    if len(strips) == 1:
-        return strips
-    kept: list[Strip] = []
-    for one in sorted(strips, key=lambda strip: strip.noise):
-        half = (one.bits + 2.5) * one.unit
-        if all(
-            one.id != other.id
-            and (
-                abs(one.column - other.column) > 0.24 * half
-                or abs(one.row - other.row) > half + (other.bits + 2.5) * other.unit
-            )
-            for other in kept
-        ):
+def _best(readings: list[_Reading]) -> list[_Reading]:
+    """One per id and place: of rivals, the one that fits best."""
+    if len(readings) < 2:
+        return readings
+    kept: list[_Reading] = []
+    for one in sorted(readings, key=lambda reading: reading.seen.noise):
+        if not any(one.seen.id == other.seen.id or _same_place(one, other) for other in kept):
             kept.append(one)
     return kept
+
+
+def _same_place(one: _Reading, other: _Reading) -> bool:
+    return (
+        abs(one.seen.column - other.seen.column) <= 0.24 * one.half
+        and abs(one.seen.row - other.seen.row) <= one.half + other.half
+    )

@@ -15,11 +15,14 @@ import numpy as np
 from polepilot.core.errors import InternalError
 from polepilot.core.landmark import LandmarkKind
 from polepilot.core.observation import Image
+from polepilot.core.vision.paint import ORANGE, Paint
 
 VERSION = 1
 IDS = 256
 MOST_STRIPS = 40
 _LIBRARY = Path(__file__).with_name("_kernel.so")
+_SHAPES = ((), (1,), (3,))
+"""Channels of a picture: grey in two ways, and blue-green-red."""
 
 REASONS = (
     "",
@@ -132,8 +135,7 @@ class Kernel:
     Args:
         kinds: the ids that exist (1 to 255) and what each looks like.
         constant: camera constant, pixels.
-        channels: in which channels of a colour picture (0 blue, 1 green, 2 red) the bright paint
-            is brightest and darkest; None for the second: paint without colour.
+        paint: what their bright segments are painted with; grey pictures show any of them.
 
     Raises:
         InternalError: the library is missing or belongs to another version.
@@ -143,11 +145,12 @@ class Kernel:
         self,
         kinds: Mapping[int, LandmarkKind],
         constant: float,
-        channels: tuple[int, int | None] = (2, 0),
+        paint: Paint = ORANGE,
     ) -> None:
         self._look = _library().eye_look
-        task = _Task(high=channels[0], low=-1 if channels[1] is None else channels[1])
-        task.weights[:] = (29, 150, 77)
+        high, low = paint.channels
+        task = _Task(high=high, low=-1 if low is None else low)
+        task.weights[:] = paint.weights
         task.constant = constant
         for number, kind in kinds.items():
             task.kinds[number] = _Kind(
@@ -161,8 +164,14 @@ class Kernel:
         read and rejected ones, the widest first.
 
         Raises:
+            InternalError: not such a picture.
             MemoryError: there is no memory for the search.
         """
+        if image.dtype != np.uint8 or image.ndim not in (2, 3) or image.shape[2:] not in _SHAPES:
+            raise InternalError(
+                f"a picture of {image.dtype}, {image.shape}: expected uint8, rows x columns x 3, "
+                "or rows x columns."
+            )
         if image.strides[-1] != 1 or (image.ndim == 3 and image.strides[1] != image.shape[2]):
             image = np.ascontiguousarray(image)
         picture = _Picture(

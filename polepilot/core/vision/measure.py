@@ -12,11 +12,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from polepilot.core.geometry import wrap_angle
 from polepilot.core.landmark import LandmarkKind
 from polepilot.core.observation import Detection, RangeBearing
 from polepilot.core.vehicle import Camera
 from polepilot.core.vision.kernel import Strip
+from polepilot.core.vision.lens import undistort
 
 PITCH_PRIOR = math.radians(1.5)
 """A camera that is meant to look level does so within this."""
@@ -35,8 +38,8 @@ RANGE_FLOOR = 0.0004
 grey levels that are not quite sRGB, roll."""
 UNIT_FACTOR = 1.15
 """By how much the scale is less certain than a fit with independent noise says."""
-COLUMN_FACTOR = 1.0
-COLUMN_FLOOR = 0.06
+COLUMN_FACTOR = 1.5
+COLUMN_FLOOR = 0.13
 """Pixels by which the strip's middle is uncertain besides what the fit knows."""
 LEAN_SIGMA = 0.004
 """Columns per row by which a strip's lean is uncertain."""
@@ -123,8 +126,52 @@ def stands(strip: Strip, kind: LandmarkKind, camera: Camera) -> bool:
     return lowest > -0.1 * kind.height and highest < HIGHEST + kind.height / 2
 
 
-def measure(strip: Strip, kind: LandmarkKind, pitch: Pitch, camera: Camera) -> Detection:
+def through_pinhole(strip: Strip, kind: LandmarkKind, camera: Camera) -> Strip:
+    """``strip`` as it would be seen without the lens's distortion.
+
+    A lens moves the edges of segments and bows the strip. Each edge goes from where the kernel's
+    model has it, on a straight line, to where a pinhole would draw it, and the same model is fitted
+    to the same edges there: what it leaves over is alike in both, so that it cancels out.
+    Where the lens draws nothing all becomes nan, and such a strip ``stands`` nowhere.
+    """
+    code, half = strip.code, kind.segments / 2
+    # The outer edges, often hardly a step against what is behind, count for little in the kernel.
+    places = np.array([k for k in range(1, kind.segments) if code[k] != code[k - 1]]) - half
+    rows = strip.unit * places / (1 + strip.sag * places)
+    line = np.column_stack([strip.column + strip.lean * rows, strip.row + rows])
+    sides = [(strip.column + side, strip.row) for side in (-0.5, 0.5)]
+    points = undistort(np.vstack([line, sides]), camera)
+    ideal = Strip.from_buffer_copy(strip)
+    if not np.isfinite(points).all():
+        ideal.column = ideal.row = ideal.unit = math.nan
+        return ideal
+    columns, rows = points[:-2].T
+    middle = rows.mean()
+    # row = first + unit * k / (1 + sag * k), linear in its three unknowns.
+    system = np.column_stack([np.ones_like(places), places, -places * (rows - middle)])
+    first, slope, sag = np.linalg.lstsq(system, rows - middle, rcond=None)[0]
+    lean = np.cov(columns, rows)[0, 1] / np.var(rows, ddof=1)
+    ideal.row = middle + first
+    ideal.unit = slope - first * sag
+    ideal.sag = sag
+    ideal.lean = lean
+    ideal.column = columns.mean() + lean * first
+    ideal.column_sigma = strip.column_sigma * (points[-1, 0] - points[-2, 0])
+    return ideal
+
+
+def measure(
+    strip: Strip,
+    kind: LandmarkKind,
+    pitch: Pitch,
+    camera: Camera,
+    seen: Strip | None = None,
+) -> Detection:
     """A strip that was read, in metres and radians.
+
+    Args:
+        strip: as a pinhole sees it; ``through_pinhole`` where the lens bends.
+        seen: as the picture shows it, where that is something else.
 
     With the optical axis raised by the pitch, a piece of a vertical pole seen at elevation e, at
     the angle a from the optical axis, covers cos(a)^2 / cos(e)^2 more pixels than Eq. 1 says.
@@ -143,13 +190,14 @@ def measure(strip: Strip, kind: LandmarkKind, pitch: Pitch, camera: Camera) -> D
     )
     sigma = math.hypot(COLUMN_FACTOR * strip.column_sigma, COLUMN_FLOOR, LEAN_SIGMA * off)
     half = kind.segments / 2
+    shown = seen or strip
     return Detection(
         id=strip.id,
         range=distance,
         bearing=bearing,
-        column=strip.column,
-        top=strip.row - strip.unit * half / (1 - strip.sag * half),
-        bottom=strip.row + strip.unit * half / (1 + strip.sag * half),
+        column=shown.column,
+        top=shown.row - shown.unit * half / (1 - shown.sag * half),
+        bottom=shown.row + shown.unit * half / (1 + shown.sag * half),
         range_sigma=relative * distance,
         bearing_sigma=sigma * math.cos(bearing) ** 2 / camera.constant,
     )

@@ -6,7 +6,7 @@ room, paint and sensor are drawn like those of the studio's clean pictures.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import cv2
 import numpy as np
@@ -29,6 +29,7 @@ def posed(
     *,
     lighting: Lighting | None = None,
     plain: bool = False,
+    behind: Callable[[Floats], None] | None = None,
 ) -> Image:
     """A room with these poles, none in front of another.
 
@@ -38,12 +39,15 @@ def posed(
         seed: of everything that is not given.
         lighting: the light; default: drawn.
         plain: a sensor that is simply good: no mosaic, no sharpening, no JPEG.
+        behind: paints things into the light of the room (rows x columns x RGB), in place.
     """
     rng = np.random.default_rng([2_255, seed])
     if lighting is None:
         lighting = draw_lighting(rng, 6500.0, 2900.0, 1.5)
     farthest = max((pole.range for pole in poles), default=6.0)
     picture = room(eye, rng, lighting, poles, farthest + rng.uniform(0.5, 4.0))
+    if behind is not None:
+        behind(picture)
     picture = np.asarray(cv2.GaussianBlur(picture, (0, 0), eye.blur), np.float32)
     for pole in sorted(poles, key=lambda one: -one.range):
         see(pole, eye, lighting).onto(picture)

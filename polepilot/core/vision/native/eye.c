@@ -72,8 +72,8 @@ static int read_strip(const eye_task *task, const eye_candidate *candidate,
     if (!eye_segment_levels(upright, scale, segments, levels))
         return EYE_NO_SCALE;
     double noise = scale->noise / sqrt(scale->unit > 1 ? scale->unit : 1);
-    reason = eye_read(task, levels, segments, upright->channels, noise, out->width, out->code,
-                      &out->tint);
+    reason = eye_read(task, levels, segments, upright->channels, noise, out->width,
+                      candidate->open_top || candidate->open_bottom, out->code, &out->tint);
     if (reason != EYE_READ)
         return reason;
     int seen = eye_decode(out->code, segments), wanted = *id;

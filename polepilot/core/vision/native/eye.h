@@ -146,7 +146,7 @@ int eye_refine_scale(const eye_upright *upright, const eye_task *task, const cha
 int eye_segment_levels(const eye_upright *upright, const eye_scale *scale, int segments,
                        double levels[][3]);
 int eye_read(const eye_task *task, double levels[][3], int segments, int channels, double noise,
-             double width, char *code, double *tint);
+             double width, int open, char *code, double *tint);
 int eye_fit_side(const eye_picture *picture, const eye_upright *upright, double half,
                  int flat, eye_side *out);
 

@@ -8,6 +8,7 @@
 
 #define TOLERANCE 0.30     /* of the distance between bright and dark */
 #define DARK_TOLERANCE 0.18
+#define OPEN_TOLERANCE 0.14
 #define MOST_TOLERANCE 0.45
 #define DARKEST_SHARE 0.45 /* of the bright paint's light that black gives back (haze, glare) */
 #define THIN_SHARE 0.35    /* as much more where the strip is hardly a pixel wide */
@@ -16,11 +17,13 @@
 #define LEAST_COLOUR 0.25  /* of the bright paint's light: its brightest channel minus its darkest */
 
 int eye_read(const eye_task *task, double levels[][3], int segments, int channels, double noise,
-             double width, char *code, double *tint)
+             double width, int open, char *code, double *tint)
 {
     double first[3], last[3], dark[3] = {0}, mean[3];
     double room = TOLERANCE + 2 * noise;
     room = room > MOST_TOLERANCE ? MOST_TOLERANCE : room;
+    /* Where an end bar's end is not to be seen it may be something else that is as bright. */
+    double bright_room = open ? OPEN_TOLERANCE + 2 * noise : room;
     double dark_room = DARK_TOLERANCE + 2 * noise;
     int fences = 0;
     for (int i = 2; i < segments - 2; i += 2, fences++)
@@ -62,7 +65,7 @@ int eye_read(const eye_task *task, double levels[][3], int segments, int channel
         }
         code[i] = share > 0.5 ? '1' : '0';
         /* Black is black everywhere on a pole; bright paint has shade and gloss. */
-        double nearest = share > 0.5 ? 1 : 0, least = nearest > 0 ? room : dark_room;
+        double nearest = share > 0.5 ? 1 : 0, least = nearest > 0 ? bright_room : dark_room;
         if (fabs(share - nearest) > least || sqrt(off / power) > least)
             reason = EYE_NEITHER;
     }

@@ -45,7 +45,9 @@ def replay(
     recording = read_dataset(dataset)
     camera = recording.camera
     detector = LandmarkDetector(
-        camera, {number: mark.kind for number, mark in recording.landmarks.items()}
+        camera,
+        {number: mark.kind for number, mark in recording.landmarks.items()},
+        recording.paint,
     )
 
     unusable: list[str] = []

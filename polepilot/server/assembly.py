@@ -18,6 +18,7 @@ from polepilot.core.robot.ports import CameraPort, Clock
 from polepilot.core.robot.robot import Robot
 from polepilot.core.sim.clock import PacedClock
 from polepilot.core.sim.obstacle import Obstacle
+from polepilot.core.sim.render import Look
 from polepilot.core.sim.world import World, start_of
 from polepilot.core.site import Site, parse_site
 from polepilot.core.vision.capture import CameraCapture
@@ -101,6 +102,7 @@ def _simulated(settings: Settings, site: Site) -> Assembly:
         settings.model,
         seed=seed,
         disturbances=settings.disturbances(np.random.default_rng(seed)),
+        look=Look.painted(settings.paint),
     )
     rendered = settings.simulation.sensing == "rendered"
     sensor = BackgroundSensor(_eye(world.camera, settings)) if rendered else None
@@ -109,9 +111,10 @@ def _simulated(settings: Settings, site: Site) -> Assembly:
 
 
 def _eye(camera: CameraPort, settings: Settings) -> Eye:
-    lens = settings.model.camera
-    kind = PaperDetector if settings.landmark.detector == "paper" else LandmarkDetector
-    return Eye(camera, lambda kinds: kind(lens, kinds))
+    lens, paint = settings.model.camera, settings.paint
+    if settings.landmark.detector == "paper":
+        return Eye(camera, lambda kinds: PaperDetector(lens, kinds))
+    return Eye(camera, lambda kinds: LandmarkDetector(lens, kinds, paint))
 
 
 def open_services(settings: Settings, host: str, port: int, data: Path | None) -> Services:

@@ -26,6 +26,7 @@ from polepilot.core.robot.robot import RobotSettings
 from polepilot.core.sim.motion import Disturbances
 from polepilot.core.vehicle import Camera, PanUnit, Proximity, RobotModel, Vehicle
 from polepilot.core.vision.devices import CameraControls
+from polepilot.core.vision.paint import Paint
 from polepilot.server.settings_errors import explain_syntax, explain_validation, refusal
 from polepilot.server.settings_sections import (
     CameraSettings,
@@ -174,6 +175,11 @@ class Settings(Section):
             localizer=self.localization,
             limits=self.supervision,
         )
+
+    @property
+    def paint(self) -> Paint:
+        """What the bright segments of landmarks are painted with."""
+        return Paint.parse(self.landmark.bright)
 
     @property
     def port_address(self) -> PortAddress | None:

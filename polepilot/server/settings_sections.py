@@ -13,12 +13,13 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from polepilot.core.control.supervisor import Limits
-from polepilot.core.errors import ConfigError
+from polepilot.core.errors import ConfigError, InputError
 from polepilot.core.link.calibration import DriveCalibration
 from polepilot.core.link.usb import PortAddress
 from polepilot.core.localization.localizer import LocalizerSettings as Localization
 from polepilot.core.vehicle import Camera, PanUnit, Proximity, Vehicle
 from polepilot.core.vision.lens import Lens
+from polepilot.core.vision.paint import COLOURS, EXPECTED, ORANGE, Paint
 from polepilot.server.settings_errors import refusal
 
 _VEHICLE, _CAMERA, _PAN, _PROXIMITY = Vehicle(), Camera(), PanUnit(), Proximity()
@@ -252,11 +253,26 @@ class VehicleSettings(Section):
 
 
 class LandmarkSettings(Section):
-    """Who reads landmarks in pictures. What they look like is each site's own business."""
+    """How landmarks are read in pictures. Their ids, places and sizes belong to each site."""
 
     detector: Literal["default", "paper"] = Field(
         default="default", description='"default", or "paper" for the source paper\'s method'
     )
+    bright: str = Field(
+        default="orange",
+        description="colour of the bright segments, with black between them: a name "
+        f'({", ".join(COLOURS)}) or "#rrggbb"; "white" for cameras that see no colour',
+    )
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> LandmarkSettings:
+        try:
+            paint = Paint.parse(self.bright)
+        except InputError as error:
+            raise refusal("bright", self.bright, EXPECTED) from error
+        if self.detector == "paper" and paint != ORANGE:
+            raise refusal("bright", self.bright, '"orange", because landmark.detector is "paper"')
+        return self
 
 
 class LinkSettings(Section):

@@ -130,6 +130,12 @@ def test_values_reach_the_core() -> None:
             '[landmark]\ndetector = "x"',
             'landmark.detector is "x": expected one of "default", "paper"',
         ),
+        ('[landmark]\nbright = "beige"', 'landmark.bright is "beige": expected a bright colour'),
+        ('[landmark]\nbright = "#d0a0a0"', 'landmark.bright is "#d0a0a0": expected a bright col'),
+        (
+            '[landmark]\ndetector = "paper"\nbright = "green"',
+            'line 3: landmark.bright is "green": expected "orange", because landmark.detector is',
+        ),
         ("[drive]\nservo_scale = 0", "drive.servo_scale is 0.0: expected another number than 0"),
         ("[drive]\nservo_center_rad = 1", "drive.servo_center_rad is 1.0: expected within servo_"),
         ("[localizer]\nlost_after_s = 1", "localizer.lost_after_s is 1.0: expected at least degr"),

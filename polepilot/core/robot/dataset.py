@@ -13,6 +13,7 @@ from polepilot.core.landmark import Landmark, LandmarkKind
 from polepilot.core.observation import Odometry, PanReading
 from polepilot.core.trajectory import Trajectory, read_tum
 from polepilot.core.vehicle import Camera, Vehicle
+from polepilot.core.vision.paint import ORANGE, Paint
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +46,8 @@ class Dataset:
     landmarks: dict[int, Landmark]
     samples: tuple[Sample, ...]
     truth: Trajectory | None = None
+    paint: Paint = ORANGE
+    """Of the landmarks' bright segments; the optional field ``landmark.bright``."""
 
     @property
     def frames(self) -> int:
@@ -86,6 +89,7 @@ def read_dataset(folder: Path) -> Dataset:
         landmarks=_landmarks(root),
         samples=_samples(folder),
         truth=read_tum(truth) if truth.exists() else None,
+        paint=root.child("landmark").paint(),
     )
 
 
@@ -153,6 +157,16 @@ class _Fields:
             )
         except DatasetError:
             raise
+        except InputError as error:
+            raise DatasetError(f"{self._where}: {error.message}") from error
+
+    def paint(self) -> Paint:
+        """``bright``, of the landmarks' bright segments; orange where it is not said."""
+        if "bright" not in self:
+            return ORANGE
+        text = self.text("bright")
+        try:
+            return Paint.parse(text)
         except InputError as error:
             raise DatasetError(f"{self._where}: {error.message}") from error
 

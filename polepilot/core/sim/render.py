@@ -20,6 +20,7 @@ from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.landmark import Landmark
 from polepilot.core.observation import Image
 from polepilot.core.vehicle import Camera
+from polepilot.core.vision.paint import ORANGE, Paint
 
 Colour = tuple[float, float, float]
 """Linear reflectance, blue-green-red."""
@@ -59,6 +60,14 @@ class Look:
     """From the first to the last row of the rolling shutter, seconds."""
     exposure_time: float = 0.003
     """How long a row gathers light, seconds."""
+
+    @classmethod
+    def painted(cls, paint: Paint) -> Look:
+        """The usual light on poles of this paint; no paint gives all light back, or none."""
+        if paint == ORANGE:
+            return cls()
+        blue, green, red = (0.02 + 0.73 * share for share in paint.reflectance)
+        return cls(bright=(blue, green, red))
 
 
 class Renderer:

@@ -23,7 +23,7 @@ from polepilot.core.sim.board import Board, BoardInputs, BoardSettings
 from polepilot.core.sim.motion import Actuation, Disturbances, Motion
 from polepilot.core.sim.obstacle import Obstacle
 from polepilot.core.sim.proximity import sense
-from polepilot.core.sim.render import Renderer
+from polepilot.core.sim.render import Look, Renderer
 from polepilot.core.sim.sensing import sightings
 from polepilot.core.site import Site
 from polepilot.core.vehicle import RobotModel
@@ -63,6 +63,7 @@ class World:
         start: true pose of `base_link`; None stands at the site's start, or inside its floor.
         board: settings of the microcontroller; None fits them to the model, without encoders.
         full_speed: of a rear wheel under full duty, m/s.
+        look: light and paint in the camera's pictures.
     """
 
     def __init__(
@@ -75,8 +76,10 @@ class World:
         start: Pose2D | None = None,
         board: BoardSettings | None = None,
         full_speed: float = 0.5,
+        look: Look | None = None,
     ) -> None:
         self.model = model or RobotModel()
+        self._look = look
         self._lock = threading.RLock()
         of_body, of_motion, self._of_ranger, self._of_picture, self._of_sighting = (
             np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(5)
@@ -189,7 +192,11 @@ class World:
     def renderer(self) -> Renderer:
         """A new one for the present site."""
         return Renderer(
-            self.model.camera, self._site.landmarks, self._site.segments(), self._of_picture
+            self.model.camera,
+            self._site.landmarks,
+            self._site.segments(),
+            self._of_picture,
+            self._look,
         )
 
     def advance(self, to: float) -> None:

@@ -22,6 +22,7 @@ from polepilot.core.trajectory import (
     read_tum,
     write_tum,
 )
+from polepilot.core.vision.paint import ORANGE, Paint
 
 DOCUMENT: dict[str, Any] = {
     "camera": {
@@ -221,6 +222,9 @@ def test_near_its_end_the_pan_may_have_turned() -> None:
     assert sigma > math.radians(0.5)
 
 
+LANDMARK: dict[str, Any] = DOCUMENT["landmark"]
+
+
 def changed(**changes: Any) -> dict[str, Any]:
     return {**DOCUMENT, **changes}
 
@@ -234,6 +238,8 @@ def changed(**changes: Any) -> dict[str, Any]:
         (changed(landmarks=[{"id": 16, "x": 0, "y": 0}]), GOOD, r"landmarks\[0\].*does not fit"),
         (changed(landmarks=DOCUMENT["landmarks"] * 2), GOOD, "id 3 occurs twice"),
         (changed(landmark={"bits": 7, "segment_m": 1, "diameter_m": 1}), GOOD, "landmark: bits"),
+        (changed(landmark=LANDMARK | {"bright": "beige"}), GOOD, "landmark: bright is 'beige'"),
+        (changed(landmark=LANDMARK | {"bright": 3}), GOOD, "landmark: bright is 3: expected a te"),
         (DOCUMENT, [GOOD[1], GOOD[0], GOOD[2]], r"samples.jsonl:2.*expected rising"),
         (DOCUMENT, [{"t": math.nan, "kind": "pan", "angle": 0}], r":1: sample: t is nan"),
         (DOCUMENT, [{"t": 0, "kind": "pan", "angle": math.inf}], r":1: sample: angle is inf"),
@@ -262,6 +268,12 @@ def test_endless_json_is_refused(tmp_path: Path, text: str) -> None:
     (folder / "dataset.json").write_text(text)
     with pytest.raises(DatasetError, match=r"dataset\.json: no JSON that can be read"):
         read_dataset(folder)
+
+
+def test_landmarks_of_another_colour(tmp_path: Path) -> None:
+    folder = write(tmp_path / "run", changed(landmark=LANDMARK | {"bright": "green"}))
+    assert read_dataset(folder).paint == Paint.parse("green")
+    assert read_dataset(write(tmp_path / "run")).paint == ORANGE
 
 
 def test_lines_end_where_the_file_says(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@
 #define PARAMETERS 6 /* levels, middle, blur, half width */
 #define WIDTH_PRIOR 0.04 /* of the half width */
 #define BLUR_PRIOR 1.0
+#define CUT_SIGMA 0.05 /* of the half width: where a side is cut off its light is not known */
 
 /* One column of the model: basis of the levels and derivatives; returns the prediction. */
 static double model_column(double x, double size, const double *guess, int flat, double *row)
@@ -91,6 +92,14 @@ int eye_fit_side(const eye_picture *p, const eye_upright *u, double half, int fl
             peak = u->across[i];
     if (peak < 0.002)
         return EYE_NO_CONTRAST;
+    /* Where the picture cuts one side off, the other one and the width tell the middle. */
+    int cut = u->column - half < 0 ? -1 : u->column + half > p->columns - 1 ? 1 : 0;
+    if (cut) {
+        int at = cut < 0 ? to - 1 : from;
+        while (at > from - (cut > 0) && at < to - (cut > 0) && u->across[at] < 0.5 * peak)
+            at += cut;
+        guess[3] = u->across_first + at * u->step + cut * half;
+    }
     guess[0] = 0.6 * peak;
     guess[2] = flat ? 0 : 0.4 * peak;
     for (int round = 0; round < ROUNDS; round++) {
@@ -135,7 +144,7 @@ int eye_fit_side(const eye_picture *p, const eye_upright *u, double half, int fl
         guess[4] += right[4] < -0.5 ? -0.5 : right[4] > 0.5 ? 0.5 : right[4];
         guess[4] = guess[4] < 0.25 ? 0.25 : guess[4] > half + 2 ? half + 2 : guess[4];
         guess[5] += right[5] < -0.2 * half ? -0.2 * half : right[5] > 0.2 * half ? 0.2 * half : right[5];
-        if (!(fabs(guess[3] - u->column) <= half + 2) || !(guess[5] > 0.4 * half))
+        if (!(fabs(guess[3] - u->column) <= half + 2 + (cut ? half : 0)) || !(guess[5] > 0.4 * half))
             return EYE_WRONG_WIDTH;
         if (fabs(move) < 0.015 && round > 0)
             break;
@@ -146,7 +155,7 @@ int eye_fit_side(const eye_picture *p, const eye_upright *u, double half, int fl
     out->column = guess[3];
     out->half = guess[5];
     out->blur = guess[4];
-    out->sigma = sqrt(variance * inverse[3]);
+    out->sigma = sqrt(variance * inverse[3]) + (cut ? CUT_SIGMA * half : 0);
     out->noise = sqrt(plain / (to - from)) / peak;
     out->front = flat ? 1.0 : front_of(u, guess);
     out->sides = 2;

@@ -31,7 +31,8 @@ def found() -> Image:
 
 
 def _drawn(image: Image, answers: list[Detection]) -> Image:
-    canvas = cv2.resize(image, None, fx=_SCALE, fy=_SCALE, interpolation=cv2.INTER_CUBIC)
+    large = cv2.resize(image, None, fx=_SCALE, fy=_SCALE, interpolation=cv2.INTER_CUBIC)
+    canvas: Image = np.asarray(large, np.uint8)
     for index, one in enumerate(answers):
         half = CAMERA.constant * 0.035 / one.range + 2
         left, right = (round(_SCALE * (one.column + side * half + 0.5)) for side in (-1, 1))
@@ -40,7 +41,7 @@ def _drawn(image: Image, answers: list[Detection]) -> Image:
         words = (f"No. {one.id}", f"{one.range:.3f} m", f"{math.degrees(one.bearing):+.2f} deg")
         # Side by side they have no room: every second one stands above.
         _label(canvas, words, (left + right) // 2, top - 66 if index % 2 else bottom + 8)
-    return np.asarray(canvas, np.uint8)
+    return canvas
 
 
 def _label(canvas: Image, words: tuple[str, ...], middle: int, top: int) -> None:

@@ -23,7 +23,7 @@ Floats = NDArray[np.floating[Any]]
 
 _WEIGHTS = (29, 150, 77)
 _FAINTEST = 16
-_HALF_LIGHT = 0.70
+_HALF_LIGHT = 0.60
 _CELLS = 400
 
 

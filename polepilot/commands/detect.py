@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from polepilot.commands.files import write_whole
 from polepilot.commands.ids import parse_ids
 from polepilot.core.errors import ImageError, InputError
 
@@ -16,7 +17,9 @@ if TYPE_CHECKING:
     from polepilot.core.landmark import LandmarkKind
     from polepilot.core.observation import Detection, Image
     from polepilot.core.vehicle import Camera
-    from polepilot.core.vision.detector import Detector
+    from polepilot.core.vision.detector import LandmarkDetector, Look
+    from polepilot.core.vision.paint import Paint
+    from polepilot.core.vision.paper import PaperDetector
 
 
 def detect(
@@ -35,21 +38,33 @@ def detect(
     segment: Annotated[float, typer.Option(help="Length of a segment, metres.")] = 0.05,
     diameter: Annotated[float, typer.Option(help="Thickness or width, metres.")] = 0.07,
     shape: Annotated[str, typer.Option(help="cylinder or flat.")] = "cylinder",
+    bright: Annotated[
+        str,
+        typer.Option(help="Colour of bright segments: orange, green, #00a040, ...; or white."),
+    ] = "orange",
     detector: Annotated[str, typer.Option(help="default or paper.")] = "default",
     annotate: Annotated[
-        Path | None, typer.Option(metavar="OUT.png", help="Draw what was found (one picture).")
+        Path | None,
+        typer.Option(
+            metavar="OUT.png",
+            help="Draw what was found, and what was not and why; of several pictures OUT-1.png, "
+            "OUT-2.png, ...",
+        ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document.")] = False,
 ) -> None:
     """Find landmarks in pictures: id, range to the axis, bearing (left positive)."""
+    from polepilot.core.vision.annotate import annotate as draw
     from polepilot.core.vision.images import read_image
 
     if not (math.isfinite(camera_constant) and camera_constant > 0):
         raise InputError(f"--camera-constant is {camera_constant}: expected pixels, above 0.")
     if detector not in ("default", "paper"):
         raise InputError(f"--detector is {detector!r}: expected 'default' or 'paper'.")
-    if annotate is not None and len(files) != 1:
-        raise InputError(f"--annotate draws one picture: got {len(files)}.")
+    drawings = [] if annotate is None else _drawings(annotate, files)
+    paint = paint_of(bright)
+    if detector == "paper" and str(paint) != "orange":
+        raise InputError(f"--bright is {bright!r}: expected 'orange' with --detector paper.")
     axis = None if center is None else parse_center(center)
     kinds = kinds_of(ids, bits, segment, diameter, shape)
     images: list[Image] = []
@@ -61,16 +76,21 @@ def detect(
             problems.append(error.message.rstrip("."))
     if problems:
         raise ImageError("; ".join(problems) + ".")
-    frames: list[tuple[str, list[Detection]]] = []
+    frames: list[tuple[str, Look]] = []
     for file, image in zip(files, images, strict=True):
         camera = _camera(image, camera_constant, axis)
-        found = _detector(detector, camera, kinds).detect(image)
-        frames.append((file, found))
-        if annotate is not None:
-            _annotate(image, found, annotate)
+        frames.append((file, _detector(detector, camera, kinds, paint).examine(image)))
+    pages = {
+        out: _encoded(draw(image, look, Path(file).name), out)
+        for out, image, (file, look) in zip(drawings, images, frames, strict=False)
+    }
+    write_whole(pages, "--annotate")
     if as_json:
         document = {
-            "frames": [{"file": name, "detections": [_entry(d) for d in f]} for name, f in frames]
+            "frames": [
+                {"file": file, "detections": [_entry(one.detection) for one in look.found]}
+                for file, look in frames
+            ]
         }
         typer.echo(json.dumps(document))
     else:
@@ -117,6 +137,20 @@ def kinds_of(
     return dict.fromkeys(chosen, kind)
 
 
+def paint_of(bright: str) -> Paint:
+    """The colour that ``--bright`` names.
+
+    Raises:
+        InputError: there is no such colour, or nobody could see it.
+    """
+    from polepilot.core.vision.paint import Paint
+
+    try:
+        return Paint.parse(bright)
+    except InputError as error:
+        raise InputError(f"--{error.message}") from error
+
+
 def _camera(image: Image, constant: float, axis: tuple[float, float] | None) -> Camera:
     from polepilot.core.vehicle import Camera
 
@@ -125,11 +159,15 @@ def _camera(image: Image, constant: float, axis: tuple[float, float] | None) -> 
     return Camera(constant=constant, width=width, height=height, center_x=x, center_y=y)
 
 
-def _detector(name: str, camera: Camera, kinds: dict[int, LandmarkKind]) -> Detector:
+def _detector(
+    name: str, camera: Camera, kinds: dict[int, LandmarkKind], paint: Paint
+) -> LandmarkDetector | PaperDetector:
     from polepilot.core.vision.detector import LandmarkDetector
     from polepilot.core.vision.paper import PaperDetector
 
-    return PaperDetector(camera, kinds) if name == "paper" else LandmarkDetector(camera, kinds)
+    if name == "paper":
+        return PaperDetector(camera, kinds)
+    return LandmarkDetector(camera, kinds, paint)
 
 
 def _entry(detection: Detection) -> dict[str, Any]:
@@ -145,17 +183,20 @@ def _entry(detection: Detection) -> dict[str, Any]:
     }
 
 
-def _table(frames: list[tuple[str, list[Detection]]]) -> None:
+def _table(frames: list[tuple[str, Look]]) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from polepilot.core.vision.annotate import summary
+
     table = Table("picture", "id", "range cm", "± cm", "bearing °", "± °", "column")
-    for name, found in frames:
-        if not found:
-            table.add_row(name, "-", "", "", "", "", "")
-        for d in found:
+    for file, look in frames:
+        if not look.found:
+            table.add_row(file, "-", "", "", "", "", "")
+        for one in look.found:
+            d = one.detection
             table.add_row(
-                name,
+                file,
                 str(d.id),
                 f"{d.range * 100:.1f}",
                 f"{d.range_sigma * 100:.1f}",
@@ -163,29 +204,42 @@ def _table(frames: list[tuple[str, list[Detection]]]) -> None:
                 f"{math.degrees(d.bearing_sigma):.2f}",
                 f"{d.column:.1f}",
             )
-    Console().print(table)
+    console = Console()
+    console.print(table)
+    for file, look in frames:
+        if not look.found:
+            console.print(f"{file}: {summary(look)}.", markup=False, highlight=False, soft_wrap=True)
 
 
-def _annotate(image: Image, found: list[Detection], out: Path) -> None:
+def _drawings(out: Path, files: list[str]) -> list[Path]:
+    """Where what was found in each file is drawn.
+
+    Raises:
+        InputError: no name of a picture, or that of one of ``files``.
+    """
+    if out.suffix.lower() not in (".png", ".jpg", ".jpeg"):
+        raise InputError(f"--annotate {out}: expected a file whose name ends with .png or .jpg.")
+    numbers = range(1, len(files) + 1)
+    if len(files) > 1:
+        drawings = [out.with_stem(f"{out.stem}-{number}") for number in numbers]
+    else:
+        drawings = [out]
+    taken = {Path(file).resolve() for file in files}
+    for drawing in drawings:
+        if drawing.resolve() in taken:
+            raise InputError(f"--annotate {drawing}: is a picture to look at; expected a new file.")
+    return drawings
+
+
+def _encoded(picture: Image, out: Path) -> bytes:
     import cv2
 
-    scale = 2
-    size = (image.shape[1] * scale, image.shape[0] * scale)
-    canvas = cv2.resize(image, size, interpolation=cv2.INTER_NEAREST)
-    if canvas.ndim == 2:
-        canvas = cv2.cvtColor(canvas, cv2.COLOR_GRAY2BGR)
-    green = (80, 255, 80)
-    for d in found:
-        half = max((d.bottom - d.top) * 0.08, 2.0)
-        corners = [(d.column - half, d.top), (d.column + half, d.bottom)]
-        first, last = ((round((x + 0.5) * scale), round((y + 0.5) * scale)) for x, y in corners)
-        cv2.rectangle(canvas, first, last, green, 1, cv2.LINE_AA)
-        text = f"{d.id}: {d.range * 100:.1f} cm {math.degrees(d.bearing):+.2f} deg"
-        place = (min(first[0], max(size[0] - 230, 0)), max(first[1] - 6, 14))
-        cv2.putText(canvas, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.5, green, 1, cv2.LINE_AA)
     try:
-        written = cv2.imwrite(str(out), canvas)
+        done, data = cv2.imencode(out.suffix.lower(), picture)
     except cv2.error:
-        written = False
-    if not written:
-        raise InputError(f"--annotate {out}: cannot be written; expected a new .png or .jpg file.")
+        done = False
+    if not done:
+        raise InputError(
+            f"--annotate {out}: the picture is too large to be written as such a file."
+        )
+    return data.tobytes()

@@ -16,6 +16,8 @@ from polepilot.commands.ids import parse_ids
 from polepilot.commands.main import run
 from polepilot.core.errors import InputError
 from polepilot.core.landmark import LandmarkKind
+from polepilot.core.sim.render import Look
+from polepilot.core.vision.paint import Paint
 
 KEYS = {"id", "range", "bearing", "column", "top", "bottom", "range_sigma", "bearing_sigma"}
 
@@ -131,6 +133,11 @@ def test_every_unreadable_file_is_named(
         ["--segment", "-1"],
         ["--shape", "ball"],
         ["--detector", "best"],
+        ["--bright", "beige"],
+        ["--bright", "green", "--detector", "paper"],
+        ["--annotate", "seen.gif"],
+        ["--annotate", "seen"],
+        ["--annotate", "no/such/folder/seen.png"],
         ["--no-such-option"],
     ],
 )
@@ -150,9 +157,58 @@ def test_lists_of_ids_and_centres() -> None:
         parse_center("1,2,3")
 
 
-def test_annotate(near: str, tmp_path: Path) -> None:
-    out = tmp_path / "seen.png"
-    assert run(["detect", near, "--annotate", str(out)]) == 0
-    drawn = cv2.imread(str(out))
+def greens(path: Path) -> int:
+    """Pixels of the colour that what was found is drawn with."""
+    drawn = cv2.imread(str(path))
     assert drawn is not None
-    assert ((drawn[:, :, 1] > 200) & (drawn[:, :, 0] < 120) & (drawn[:, :, 2] < 120)).any()
+    return int(((drawn[:, :, 1] > 200) & (drawn[:, :, 0] < 120) & (drawn[:, :, 2] < 120)).sum())
+
+
+@pytest.mark.parametrize("detector", ["default", "paper"])
+def test_annotate(
+    near: str, tmp_path: Path, detector: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "seen.png"
+    options = ["--detector", detector, "--annotate", str(out), "--json"]
+    assert run(["detect", near, *options]) == 0
+    assert set(json.loads(capsys.readouterr().out)["frames"][0]["detections"][0]) == KEYS
+    assert greens(out) > 1000
+
+
+def test_annotate_numbers_several(near: str, empty: str, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    assert run(["detect", near, empty, "--annotate", str(tmp_path / "out" / "seen.jpg")]) == 0
+    names = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert names == ["seen-1.jpg", "seen-2.jpg"]
+    assert greens(tmp_path / "out" / "seen-1.jpg") > 10 * greens(tmp_path / "out" / "seen-2.jpg")
+
+
+def test_annotate_spares_what_it_looks_at(
+    near: str, empty: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = Path(near).read_bytes()
+    assert run(["detect", near, "--annotate", near]) == 2
+    assert "is a picture to look at" in capsys.readouterr().err
+    (tmp_path / "a-2.png").write_bytes(before)
+    files = [empty, str(tmp_path / "a-2.png")]
+    assert run(["detect", *files, "--annotate", str(tmp_path / "a.png")]) == 2
+    assert Path(near).read_bytes() == (tmp_path / "a-2.png").read_bytes() == before
+    assert not (tmp_path / "a-1.png").exists()
+
+
+def test_where_nothing_is_found_the_table_says_what_was_rejected(
+    near: str, empty: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["detect", empty, near, "--ids", "1-12"]) == 0
+    out = capsys.readouterr().out
+    assert f"{empty}: no landmarks; no candidate." in out
+    assert re.search(rf"{re.escape(near)}: no landmarks; \d candidates? rejected: .*no lan", out)
+
+
+def test_another_colour(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "green.png"
+    cv2.imwrite(str(path), picture([pole(6, 3.0, 0.1)], look=Look.painted(Paint.parse("green"))))
+    for bright, ids in (("#00a040", [6]), ("green", [6]), ("orange", [])):
+        assert run(["detect", str(path), "--bright", bright, "--json"]) == 0
+        found = json.loads(capsys.readouterr().out)["frames"][0]["detections"]
+        assert [one["id"] for one in found] == ids

@@ -16,9 +16,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from polepilot.core.landmark import LandmarkKind, decode
+from polepilot.core.landmark import LandmarkKind, decode, encode
 from polepilot.core.observation import Detection, Image
 from polepilot.core.vehicle import Camera
+from polepilot.core.vision.detector import Found, Look
+from polepilot.core.vision.kernel import Strip
 from polepilot.core.vision.measure import bearing_of, depth_of
 
 # R - 1.5 B > 0, in tenths so that whole numbers suffice.
@@ -60,6 +62,23 @@ class PaperDetector:
             if detection is not None:
                 found.append(detection)
         return found
+
+    def examine(self, image: Image) -> Look:
+        """The same landmarks with their strips. The paper does not say why others are none."""
+        return Look(tuple(Found(one, self._strip(one)) for one in self.detect(image)), ())
+
+    def _strip(self, one: Detection) -> Strip:
+        kind = self._kinds[one.id]
+        unit = (one.bottom - one.top) / kind.segments
+        return Strip(
+            id=one.id,
+            bits=kind.bits,
+            column=one.column,
+            row=(one.top + one.bottom) / 2,
+            unit=unit,
+            width=unit * kind.diameter / kind.segment,
+            code=encode(one.id, kind.bits).encode(),
+        )
 
     def _read(self, strip: NDArray[np.bool_], column: int) -> Detection | None:
         lit = np.flatnonzero(strip)

@@ -208,7 +208,9 @@ def _table(frames: list[tuple[str, Look]]) -> None:
     console.print(table)
     for file, look in frames:
         if not look.found:
-            console.print(f"{file}: {summary(look)}.", markup=False, highlight=False, soft_wrap=True)
+            console.print(
+                f"{file}: {summary(look)}.", markup=False, highlight=False, soft_wrap=True
+            )
 
 
 def _drawings(out: Path, files: list[str]) -> list[Path]:

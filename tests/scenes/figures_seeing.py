@@ -157,7 +157,7 @@ def side() -> Drawing:
     eye = Eye(blur=0.5)
     lamp = Lamp(np.array([-0.70, 0.68, 0.2]), np.array([1.0, 0.96, 0.9]))
     light = Lighting((lamp,), np.array([0.35, 0.35, 0.35]), np.array([0.0, 0.2]))
-    stands = pole(13, 2.4, -0.05)
+    stands = pole(13, 4.0, -0.05)
     image = posed([stands], eye, 5, lighting=light, plain=True)
     (seen,) = strips_of(image, camera_of(eye), KIND)
     fit = fit_side(*across(image, seen, 0.5 * seen.width + 5), seen)

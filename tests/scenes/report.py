@@ -201,7 +201,7 @@ def make_pictures(images: Path, results: Path = RESULTS) -> None:
     from scenes import figures_found, figures_measuring, figures_seeing
 
     images.mkdir(parents=True, exist_ok=True)
-    _, data = cv2.imencode(".jpg", figures_found.found(), [cv2.IMWRITE_JPEG_QUALITY, 82])
+    _, data = cv2.imencode(".jpg", figures_found.found(), [cv2.IMWRITE_JPEG_QUALITY, 76])
     (images / "vision-found.jpg").write_bytes(data.tobytes())
     figures_seeing.search().save(images / "vision-search.svg")
     figures_seeing.strip().save(images / "vision-strip.svg")

@@ -2,7 +2,7 @@
  *
  * A branch or a sleeve in front turns a bright bit into a dark one, and a legal code into another.
  * It goes on to both sides of the strip and ends above and below. */
-#include "eye.h"
+#include "internal.h"
 
 #include <math.h>
 

@@ -1,15 +1,16 @@
 /* One look at a picture: search, straighten, fit, read, measure. */
-#include "eye.h"
+#include "internal.h"
 
 #include <math.h>
 #include <string.h>
 
-#define MOST_MISFIT 7.0         /* with one bit set, */
-#define MISFIT_A_BIT 1.5        /* and more for every further one: the more there is to fit */
+#define ATTEMPTS 2
+#define MOST_MISFIT 7.0        /* with one bright bit, */
+#define MISFIT_A_BIT 1.5       /* and more for every further one: the more there is to fit */
 #define USUAL_NOISE 0.035      /* rms rest of the fit of the edges, of bright - dark */
 #define USUAL_SIDE_NOISE 0.06  /* rms rest of the fit across, of its peak */
 #define USUAL_PITCH 0.035      /* radians between camera and pole */
-#define USUAL_TINT 0.12
+#define USUAL_TINT 0.12        /* as in eye_strip */
 #define USUAL_SIGMA 0.006      /* of the unit, as a share of it */
 #define SURE 4e-4              /* share of the unit: no second fit makes it better */
 #define FEW_ROWS 6.0           /* per segment: JPEG blurs colour by up to as much */
@@ -52,23 +53,37 @@ static double misfit(const eye_strip *strip, double constant)
     return edges * edges + sides * sides + bend * bend + tint * tint + vague * vague;
 }
 
-/* Fits and reads a straightened strip; the reason where it is no code. ``id`` is what the search
- * has read, and then what the levels say. */
-static int read_strip(const eye_task *task, const eye_candidate *candidate,
-                      const eye_upright *upright, int sharp, int *id, eye_scale *scale,
-                      double levels[][3], eye_strip *out)
+static double most_misfit(const eye_strip *strip)
 {
-    int segments = 2 * candidate->bits + 5;
-    char code[EYE_MOST_SEGMENTS + 3];
-    eye_encode(*id, candidate->bits, code);
-    int reason = eye_fit_scale(upright, task, code, candidate, sharp, scale);
-    if (reason != EYE_READ)
-        return reason;
+    double most = MOST_MISFIT - MISFIT_A_BIT;
+    for (int bit = 0; bit < strip->bits; bit++)
+        most += strip->id >> bit & 1 ? MISFIT_A_BIT : 0;
+    return most;
+}
+
+/* What is known as soon as there is a scale. */
+static void note_scale(const eye_scale *scale, double thick, eye_strip *out)
+{
     out->row = scale->middle;
     out->unit = scale->unit;
     out->blur = scale->blur;
     out->noise = scale->noise;
-    out->width = thickest(task, candidate->bits) * scale->unit;
+    out->width = thick * scale->unit;
+}
+
+/* Fits and reads a straightened strip; the reason where it is no code. ``id`` is what the search
+ * has read, and then what the levels say. */
+static int read_strip(const eye_task *task, const eye_candidate *candidate,
+                      const eye_upright *upright, double thick, int sharp, int *id,
+                      eye_scale *scale, double levels[][3], eye_strip *out)
+{
+    int segments = 2 * candidate->bits + 5, wanted = *id;
+    char code[EYE_CODE_SIZE];
+    eye_encode(wanted, candidate->bits, code);
+    int reason = eye_fit_scale(upright, task, code, candidate, sharp, scale);
+    if (reason != EYE_READ)
+        return reason;
+    note_scale(scale, thick, out);
     if (!eye_segment_levels(upright, scale, segments, levels))
         return EYE_NO_SCALE;
     double noise = scale->noise / sqrt(scale->unit > 1 ? scale->unit : 1);
@@ -76,67 +91,70 @@ static int read_strip(const eye_task *task, const eye_candidate *candidate,
                       candidate->open_top || candidate->open_bottom, out->code, &out->tint);
     if (reason != EYE_READ)
         return reason;
-    int seen = eye_decode(out->code, segments), wanted = *id;
+    int seen = eye_decode(out->code, segments);
     if (seen == 0)
         return EYE_NO_CODE;
     *id = seen;
     return seen == wanted ? EYE_READ : EYE_NO_CODE;
 }
 
-static int examine(const eye_picture *picture, const eye_task *task, eye_candidate *candidate,
-                   eye_strip *out)
+/* Straightens, fits and reads a candidate; the reason where it is no code. */
+static int read_candidate(const eye_picture *picture, const eye_task *task,
+                          const eye_candidate *candidate, double thick, eye_upright *upright,
+                          eye_scale *scale, double levels[][3], eye_strip *out)
 {
-    int segments = 2 * candidate->bits + 5, id = candidate->id, reason = EYE_NO_CODE;
-    char code[EYE_MOST_SEGMENTS + 3];
+    int id = candidate->id, before = 0, reason = EYE_NO_CODE, coloured = picture->channels == 3;
+    /* A segment misread at whole pixels shows in the levels: look again with what they say. Where
+     * the brightest channel is too blurred to be read the brightness may be sharp enough. */
+    for (int attempt = 0; attempt < ATTEMPTS && reason != EYE_READ && id != before; attempt++) {
+        char code[EYE_CODE_SIZE];
+        eye_encode(id, candidate->bits, code);
+        reason = eye_straighten(picture, task, candidate, code, thick, upright);
+        if (reason != EYE_READ)
+            return reason;
+        out->column = upright->column;
+        out->lean = upright->lean;
+        before = id;
+        reason = read_strip(task, candidate, upright, thick, 0, &id, scale, levels, out);
+        if (reason == EYE_READ && coloured && scale->unit_sigma > SURE)
+            eye_refine_scale(upright, task, out->code, candidate, scale);
+        else if (reason != EYE_READ && id == before && coloured && out->unit < FEW_ROWS)
+            reason = read_strip(task, candidate, upright, thick, 1, &id, scale, levels, out);
+    }
+    if (reason != EYE_READ)
+        return reason;
+    out->id = id;
+    note_scale(scale, thick, out);
+    return EYE_READ;
+}
+
+/* Looks closely at a candidate; the reason where it is no landmark. */
+static int examine(const eye_picture *picture, const eye_task *task,
+                   const eye_candidate *candidate, eye_strip *out)
+{
+    int segments = 2 * candidate->bits + 5;
+    double thick = thickest(task, candidate->bits);
+    double levels[EYE_MOST_SEGMENTS][3];
     eye_upright upright;
     eye_scale scale;
-    double levels[EYE_MOST_SEGMENTS][3];
+    eye_side side;
     out->bits = candidate->bits;
     out->column = candidate->column;
     out->row = (candidate->top + candidate->bottom) / 2;
     out->unit = (candidate->bottom - candidate->top) / (segments - 4);
-    out->width = thickest(task, candidate->bits) * out->unit;
-    eye_encode(id, candidate->bits, out->code);
-    /* A segment misread at whole pixels shows in the levels: look again with what they say. Where
-     * the brightest channel is too blurred to be read the brightness may be sharp enough. */
-    for (int attempt = 0; attempt < 2 && reason != EYE_READ; attempt++) {
-        int before = id;
-        eye_encode(id, candidate->bits, code);
-        reason = eye_straighten(picture, task, candidate, code, thickest(task, candidate->bits),
-                                &upright);
-        if (reason != EYE_READ)
-            return reason;
-        out->column = upright.column;
-        out->lean = upright.lean;
-        int sharp = 0;
-        reason = read_strip(task, candidate, &upright, sharp, &id, &scale, levels, out);
-        if (reason != EYE_READ && id == before && picture->channels == 3 &&
-            out->unit < FEW_ROWS) {
-            sharp = 1;
-            reason = read_strip(task, candidate, &upright, sharp, &id, &scale, levels, out);
-        }
-        if (reason == EYE_READ && !sharp && picture->channels == 3 &&
-            scale.unit_sigma > SURE)
-            eye_refine_scale(&upright, task, out->code, candidate, &scale);
-        if (id == before)
-            break;
-    }
+    out->width = thick * out->unit;
+    eye_encode(candidate->id, candidate->bits, out->code);
+    int reason =
+        read_candidate(picture, task, candidate, thick, &upright, &scale, levels, out);
     if (reason != EYE_READ)
         return reason;
-    out->row = scale.middle;
-    out->unit = scale.unit;
-    out->blur = scale.blur;
-    out->noise = scale.noise;
-    out->width = thickest(task, candidate->bits) * scale.unit;
-    out->id = id;
     if (scale.unit < SHORTEST || scale.blur > MOST_BLUR + 0.3 * scale.unit)
         return EYE_POOR_FIT;
-    const eye_kind *kind = task->kinds + id;
+    const eye_kind *kind = task->kinds + out->id;
     if (kind->bits != candidate->bits)
         return EYE_UNKNOWN_ID;
-    eye_side side;
-    reason = eye_fit_side(picture, &upright, half_width(task, kind, scale.unit), kind->flat,
-                              &side);
+    double half = half_width(task, kind, scale.unit);
+    reason = eye_fit_side(picture, &upright, half, kind->flat, &side);
     if (reason != EYE_READ)
         return reason;
     if (eye_covered(picture, &upright, &scale, &side, out->code, levels, segments, scale.noise / 2))
@@ -150,10 +168,7 @@ static int examine(const eye_picture *picture, const eye_task *task, eye_candida
     out->unit_sigma = scale.unit_sigma;
     out->sag_sigma = scale.sag_sigma;
     out->column_sigma = side.sigma;
-    double most = MOST_MISFIT - MISFIT_A_BIT;
-    for (int bit = 0; bit < candidate->bits; bit++)
-        most += id >> bit & 1 ? MISFIT_A_BIT : 0;
-    return misfit(out, task->constant) > most ? EYE_POOR_FIT : EYE_READ;
+    return misfit(out, task->constant) > most_misfit(out) ? EYE_POOR_FIT : EYE_READ;
 }
 
 int32_t eye_look(const eye_picture *picture, const eye_task *task, eye_strip *strips,

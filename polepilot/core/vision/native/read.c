@@ -2,7 +2,7 @@
  *
  * The end bars say what bright looks like here, the fences between the bits what dark looks like.
  * Every segment must look like one of the two, in every channel; anything in between is no code. */
-#include "eye.h"
+#include "internal.h"
 
 #include <math.h>
 

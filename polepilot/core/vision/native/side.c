@@ -4,24 +4,51 @@
  * Light from one side makes the half-way points of a cylinder's sides wander by a tenth of its
  * width. Lambert's law says how its light runs over the surface: a + b u + c sqrt(1 - u^2), u from
  * -1 to 1 between the silhouettes. The middle and the blur are found with a, b and c free. */
-#include "eye.h"
+#include "internal.h"
 
 #include <math.h>
 #include <string.h>
 
-#define CELLS 8
-#define FINE_CELLS 24
+#define CELLS 8       /* strips of the surface in the model, */
+#define FINE_CELLS 24 /* and for its mean height */
+#define SHOWS 5.0     /* times the blur: light does not reach farther */
 #define ROUNDS 6
-#define LEVELS 3
-#define PARAMETERS 6 /* levels, middle, blur, half width */
+#define SETTLED 0.015 /* columns by which the middle still moves when a fit may end */
+#define MARGIN 3.0    /* columns that take part beside a strip a quarter wider than expected */
+#define LEAST_COLUMNS 3
+#define LEAST_PEAK 0.002 /* light */
+#define USUAL_BULGE 0.4  /* of the peak: how light on a cylinder is shared out on average */
+#define LIGHT_PRIOR 0.5  /* of the peak, by which it may differ from that */
 #define WIDTH_PRIOR 0.04 /* of the half width */
+#define BLUR_GUESS 0.7   /* columns */
 #define BLUR_PRIOR 1.0
+#define LEAST_BLUR 0.25
+#define LEAST_HALF 0.4   /* of the half width that is expected */
+#define USUAL_FRONT 0.9
 #define CUT_SIGMA 0.05 /* of the half width: where a side is cut off its light is not known */
+
+/* The parameters; the model is linear in those before LEVELS. */
+enum {
+    LEVEL,           /* light, bright minus dark: everywhere alike, */
+    SLOPE,           /* more from left to right, */
+    BULGE,           /* and where a cylinder faces the camera */
+    LEVELS,
+    MIDDLE = LEVELS, /* column */
+    BLUR,            /* standard deviation, columns */
+    HALF,            /* half width, columns */
+    PARAMETERS
+};
+
+/* The sums of one round of the fit. */
+typedef struct {
+    double normal[PARAMETERS * PARAMETERS], right[PARAMETERS];
+    double plain, variance; /* of what is left over: sum of squares, variance */
+} equations;
 
 /* One column of the model: basis of the levels and derivatives; returns the prediction. */
 static double model_column(double x, double size, const double *guess, int flat, double *row)
 {
-    double middle = guess[3], sharp = 1 / guess[4], half = guess[5];
+    double middle = guess[MIDDLE], sharp = 1 / guess[BLUR], half = guess[HALF];
     double weight = 2 * half / (CELLS * size);
     memset(row, 0, sizeof(double) * PARAMETERS);
     double by_middle = 0, by_blur = 0, by_half = 0, sum = 0;
@@ -29,25 +56,25 @@ static double model_column(double x, double size, const double *guess, int flat,
         double u = (2 * i + 1.0) / CELLS - 1;
         double place = middle + half * u;
         double z0 = (x - size / 2 - place) * sharp, z1 = (x + size / 2 - place) * sharp;
-        if (z1 < -5 || z0 > 5)
+        if (z1 < -SHOWS || z0 > SHOWS)
             continue;
         double b0 = eye_bell(z0), b1 = eye_bell(z1);
         double kernel = (eye_cumulative(z1) - eye_cumulative(z0)) * weight;
         double rise = sqrt(1 - u * u);
-        double level = guess[0] + guess[1] * u + (flat ? 0 : guess[2] * rise);
+        double level = guess[LEVEL] + guess[SLOPE] * u + (flat ? 0 : guess[BULGE] * rise);
         double by_place = (b0 - b1) * weight * sharp;
-        row[0] += kernel;
-        row[1] += kernel * u;
+        row[LEVEL] += kernel;
+        row[SLOPE] += kernel * u;
         if (!flat)
-            row[2] += kernel * rise;
+            row[BULGE] += kernel * rise;
         sum += level * kernel;
         by_middle += level * by_place;
         by_half += level * (by_place * u + kernel / half);
         by_blur += level * (b0 * z0 - b1 * z1) * weight * sharp;
     }
-    row[3] = by_middle;
-    row[4] = by_blur;
-    row[5] = by_half;
+    row[MIDDLE] = by_middle;
+    row[BLUR] = by_blur;
+    row[HALF] = by_half;
     return sum;
 }
 
@@ -57,109 +84,146 @@ static double front_of(const eye_upright *u, const double *guess)
     double total = 0, sum = 0;
     for (int i = 0; i < FINE_CELLS; i++) {
         double at = (2 * i + 1.0) / FINE_CELLS - 1;
-        double offset = guess[3] + guess[5] * at - u->column;
+        double offset = guess[MIDDLE] + guess[HALF] * at - u->column;
         double rise = sqrt(1 - at * at);
-        double light = guess[0] + guess[1] * at + guess[2] * rise;
+        double light = guess[LEVEL] + guess[SLOPE] * at + guess[BULGE] * rise;
         /* A blurred window: columns beside it lend it some of their light. */
-        double inside = eye_cumulative((u->half_window - offset) / guess[4]) -
-                        eye_cumulative((-u->half_window - offset) / guess[4]);
+        double inside = eye_cumulative((u->half_window - offset) / guess[BLUR]) -
+                        eye_cumulative((-u->half_window - offset) / guess[BLUR]);
         double weight = inside * (light > 0 ? light : 0);
         total += weight;
         sum += weight * rise;
     }
-    return total > 0 ? sum / total : 0.9;
+    return total > 0 ? sum / total : USUAL_FRONT;
 }
 
-/* Fits the strip's middle. ``half``: half of its width as its range has it, columns. */
-int eye_fit_side(const eye_picture *p, const eye_upright *u, double half, int flat, eye_side *out)
+/* The entries that take part: about the strip, within the picture; 0 where there are too few. */
+static int choose_columns(const eye_picture *p, const eye_upright *u, double half, int *from,
+                          int *to)
 {
-    double guess[PARAMETERS] = {0, 0, 0, u->column, 0.7, half};
-    double normal[PARAMETERS * PARAMETERS], right[PARAMETERS], row[PARAMETERS];
-    double variance = 0, peak = 0, plain = 0;
-    int from = (int)ceil((u->column - half * 1.25 - 3 - u->across_first) / u->step);
-    int to = (int)floor((u->column + half * 1.25 + 3 - u->across_first) / u->step) + 1;
-    /* Beyond the picture there is nothing to compare with. */
+    double reach = half * 1.25 + MARGIN;
     int first = (int)ceil((0.0 - u->across_first) / u->step);
     int last = (int)floor((p->columns - 1 - u->across_first) / u->step) + 1;
-    from = from < first ? first : from;
-    to = to > last ? last : to;
-    from = from < 0 ? 0 : from;
-    to = to > u->columns ? u->columns : to;
-    if (to - from < 3)
+    *from = (int)ceil((u->column - reach - u->across_first) / u->step);
+    *to = (int)floor((u->column + reach - u->across_first) / u->step) + 1;
+    /* Beyond the picture there is nothing to compare with. */
+    *from = *from < first ? first : *from;
+    *to = *to > last ? last : *to;
+    *from = *from < 0 ? 0 : *from;
+    *to = *to > u->columns ? u->columns : *to;
+    return *to - *from >= LEAST_COLUMNS;
+}
+
+/* Where the middle is if the picture cuts off the strip's left (-1) or right (1) side: the other
+ * one and the width tell. */
+static double middle_by_one_side(const eye_upright *u, double half, double peak, int cut, int from,
+                                 int to)
+{
+    int at = cut < 0 ? to - 1 : from, end = cut < 0 ? from : to - 1;
+    while (at != end && u->across[at] < 0.5 * peak)
+        at += cut;
+    return u->across_first + at * u->step + cut * half;
+}
+
+/* Pulls a parameter by ``off`` towards where a prior with this deviation has it. */
+static void pull(equations *sums, int parameter, double off, double deviation)
+{
+    double strength = sums->variance / (deviation * deviation);
+    sums->normal[parameter * PARAMETERS + parameter] += strength;
+    sums->right[parameter] += strength * off;
+}
+
+/* Compares the columns with the model: the normal equations. Priors: the width is known from the
+ * range, and light does not run wild over the surface. */
+static void compare(const eye_upright *u, const double *guess, double half, double peak, int flat,
+                    int from, int to, equations *out)
+{
+    double row[PARAMETERS];
+    memset(out->normal, 0, sizeof out->normal);
+    memset(out->right, 0, sizeof out->right);
+    out->plain = 0;
+    for (int i = from; i < to; i++) {
+        double x = u->across_first + i * u->step;
+        double rest = u->across[i] - model_column(x, u->step, guess, flat, row);
+        out->plain += rest * rest;
+        for (int a = 0; a < PARAMETERS; a++) {
+            out->right[a] += row[a] * rest;
+            for (int b = 0; b < PARAMETERS; b++)
+                out->normal[a * PARAMETERS + b] += row[a] * row[b];
+        }
+    }
+    int free = to - from - 4;
+    out->variance = out->plain / (free > 2 ? free : 2) + 1e-8 + 1e-4 * peak * peak;
+    pull(out, HALF, half - guess[HALF], WIDTH_PRIOR * half + 0.05);
+    pull(out, BLUR, BLUR_GUESS - guess[BLUR], BLUR_PRIOR);
+    pull(out, SLOPE, 0 - guess[SLOPE], LIGHT_PRIOR * peak);
+    pull(out, BULGE, (flat ? 0 : USUAL_BULGE * peak) - guess[BULGE], LIGHT_PRIOR * peak);
+    for (int a = 0; a < PARAMETERS; a++)
+        out->normal[a * PARAMETERS + a] *= 1 + 1e-9;
+}
+
+/* Moves the guess by one step, not too far; returns by how many columns the middle moves, or nan
+ * where there is no step. */
+static double move(const equations *sums, double half, double *guess)
+{
+    double solving[PARAMETERS * PARAMETERS], step[PARAMETERS];
+    memcpy(solving, sums->normal, sizeof solving);
+    memcpy(step, sums->right, sizeof step);
+    if (!eye_solve(solving, step, PARAMETERS, 1))
+        return NAN;
+    for (int a = 0; a < LEVELS; a++)
+        guess[a] += step[a];
+    double moved = eye_limit(step[MIDDLE], -1, 1);
+    guess[MIDDLE] += moved;
+    guess[BLUR] += eye_limit(step[BLUR], -0.5, 0.5);
+    guess[BLUR] = eye_limit(guess[BLUR], LEAST_BLUR, half + 2);
+    guess[HALF] += eye_limit(step[HALF], -0.2 * half, 0.2 * half);
+    return fabs(moved);
+}
+
+/* Fits the strip's middle; the reason where that cannot be. ``half``: half of its width as its range
+ * has it, columns. */
+int eye_fit_side(const eye_picture *p, const eye_upright *u, double half, int flat, eye_side *out)
+{
+    equations sums;
+    double peak = 0;
+    int from, to;
+    if (!choose_columns(p, u, half, &from, &to))
         return EYE_CUT_OFF;
     for (int i = from; i < to; i++)
         if (u->across[i] > peak)
             peak = u->across[i];
-    if (peak < 0.002)
+    if (peak < LEAST_PEAK)
         return EYE_NO_CONTRAST;
-    /* Where the picture cuts one side off, the other one and the width tell the middle. */
     int cut = u->column - half < 0 ? -1 : u->column + half > p->columns - 1 ? 1 : 0;
-    if (cut) {
-        int at = cut < 0 ? to - 1 : from;
-        while (at > from - (cut > 0) && at < to - (cut > 0) && u->across[at] < 0.5 * peak)
-            at += cut;
-        guess[3] = u->across_first + at * u->step + cut * half;
-    }
-    guess[0] = 0.6 * peak;
-    guess[2] = flat ? 0 : 0.4 * peak;
+    double guess[PARAMETERS] = {
+        [LEVEL] = (1 - USUAL_BULGE) * peak,
+        [BULGE] = flat ? 0 : USUAL_BULGE * peak,
+        [MIDDLE] = cut ? middle_by_one_side(u, half, peak, cut, from, to) : u->column,
+        [BLUR] = BLUR_GUESS,
+        [HALF] = half,
+    };
+    double astray = half + 2 + (cut ? half : 0);
     for (int round = 0; round < ROUNDS; round++) {
-        memset(normal, 0, sizeof normal);
-        memset(right, 0, sizeof right);
-        double rests = 0;
-        for (int i = from; i < to; i++) {
-            double x = u->across_first + i * u->step;
-            double rest = u->across[i] - model_column(x, u->step, guess, flat, row);
-            rests += rest * rest;
-            for (int a = 0; a < PARAMETERS; a++) {
-                right[a] += row[a] * rest;
-                for (int b = 0; b < PARAMETERS; b++)
-                    normal[a * PARAMETERS + b] += row[a] * row[b];
-            }
-        }
-        plain = rests;
-        int free = to - from - 4;
-        variance = rests / (free > 2 ? free : 2) + 1e-8 + 1e-4 * peak * peak;
-        /* Priors: the width is known from the range; light does not run wild over the surface. */
-        double pull = variance / pow(WIDTH_PRIOR * half + 0.05, 2);
-        normal[5 * PARAMETERS + 5] += pull;
-        right[5] += pull * (half - guess[5]);
-        pull = variance / (BLUR_PRIOR * BLUR_PRIOR);
-        normal[4 * PARAMETERS + 4] += pull;
-        right[4] += pull * (0.7 - guess[4]);
-        for (int a = 1; a < LEVELS; a++) {
-            pull = variance / pow(0.5 * peak, 2);
-            normal[a * PARAMETERS + a] += pull;
-            right[a] += pull * ((a == 2 && !flat ? 0.4 * peak : 0) - guess[a]);
-        }
-        for (int a = 0; a < PARAMETERS; a++)
-            normal[a * PARAMETERS + a] *= 1 + 1e-9;
-        double solving[PARAMETERS * PARAMETERS];
-        memcpy(solving, normal, sizeof normal);
-        if (!eye_solve(solving, right, PARAMETERS, 1))
+        compare(u, guess, half, peak, flat, from, to, &sums);
+        double moved = move(&sums, half, guess);
+        if (isnan(moved))
             return EYE_NO_CONTRAST;
-        for (int a = 0; a < LEVELS; a++)
-            guess[a] += right[a];
-        double move = right[3] < -1 ? -1 : right[3] > 1 ? 1 : right[3];
-        guess[3] += move;
-        guess[4] += right[4] < -0.5 ? -0.5 : right[4] > 0.5 ? 0.5 : right[4];
-        guess[4] = guess[4] < 0.25 ? 0.25 : guess[4] > half + 2 ? half + 2 : guess[4];
-        guess[5] += right[5] < -0.2 * half ? -0.2 * half : right[5] > 0.2 * half ? 0.2 * half : right[5];
-        if (!(fabs(guess[3] - u->column) <= half + 2 + (cut ? half : 0)) || !(guess[5] > 0.4 * half))
+        if (!(fabs(guess[MIDDLE] - u->column) <= astray) || !(guess[HALF] > LEAST_HALF * half))
             return EYE_WRONG_WIDTH;
-        if (fabs(move) < 0.015 && round > 0)
+        if (moved < SETTLED && round > 0)
             break;
     }
-    double inverse[PARAMETERS] = {0, 0, 0, 1, 0, 0};
-    if (!eye_solve(normal, inverse, PARAMETERS, 1))
+    double inverse[PARAMETERS] = {[MIDDLE] = 1};
+    if (!eye_solve(sums.normal, inverse, PARAMETERS, 1))
         return EYE_NO_CONTRAST;
-    out->column = guess[3];
-    out->half = guess[5];
-    out->blur = guess[4];
-    out->sigma = sqrt(variance * inverse[3]) + (cut ? CUT_SIGMA * half : 0);
-    out->noise = sqrt(plain / (to - from)) / peak;
+    out->column = guess[MIDDLE];
+    out->half = guess[HALF];
+    out->blur = guess[BLUR];
+    out->sigma = sqrt(sums.variance * inverse[MIDDLE]) + (cut ? CUT_SIGMA * half : 0);
+    out->noise = sqrt(sums.plain / (to - from)) / peak;
     out->front = flat ? 1.0 : front_of(u, guess);
-    out->sides = 2;
-    if (guess[3] - half < -0.5 || guess[3] + half > p->columns - 0.5)
-        out->sides = 1;
+    int whole = guess[MIDDLE] - half >= -0.5 && guess[MIDDLE] + half <= p->columns - 0.5;
+    out->sides = whole ? 2 : 1;
     return EYE_READ;
 }

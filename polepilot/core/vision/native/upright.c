@@ -3,19 +3,24 @@
  * Rolling shutter and roll lean a strip over. The lean is the one under which the difference of
  * bright and dark segments, averaged along the strip, stands out most: beside the strip it is about
  * nothing, whatever colour is there. */
-#include "eye.h"
+#include "internal.h"
 
 #include <math.h>
 #include <string.h>
 
 #define MARGIN 1.3      /* segments above and below the code that are kept */
 #define STEEPEST 0.118  /* columns per row: 60 degrees/s, a slow shutter and 2 degrees of roll */
-#define ROWS_A_BAND 3
+#define MOST_LEANS 12   /* that are tried to either side at first */
+#define ROUNDS 2        /* of parabolas after that */
+#define ROWS_A_BAND 3   /* more rows than this are left out */
 #define COLUMNS_ACROSS 7.0 /* more columns than this across the strip are left out */
-#define LOOKED_AT 0.70  /* share of the half width over which the profile is averaged */
+#define LOOKED_AT 0.70  /* share of the half width over which the profile is averaged, */
+#define LEAST_LOOKED_AT 0.6 /* and columns at the least */
+#define COLUMNS_A_HALF 2.5 /* more columns than this in the half of that are left out */
 #define LEAST_SIGNAL 4.0 /* grey levels of bright minus dark */
 #define ROWS_A_UNIT 2.0 /* more rows per segment than this are averaged */
 
+/* The rows of one run of the code, averaged. */
 typedef struct {
     double row;    /* middle */
     double weight; /* in the difference of bright and dark */
@@ -23,28 +28,24 @@ typedef struct {
     float signal[EYE_MOST_COLUMNS]; /* how bright the paint's colour is, no more than the paint */
 } band;
 
-static inline int clamp(int value, int low, int high)
-{
-    return value < low ? low : value > high ? high : value;
-}
-
-/* Linear light of the paint's colour: grey gives about nothing, whatever its pattern. */
+/* Linear light of the paint's colour: grey gives about nothing, whatever its pattern. Of paint that
+ * has no colour here, the brightness. */
 static inline float light_of(const uint8_t *pixel, int channels, const eye_task *task)
 {
-    if (channels == 1 || task->low < 0)
-        return eye_linear_sixteenths(eye_brightness(pixel, channels, task));
-    return eye_linear(pixel[task->high]) - eye_linear(pixel[task->low]);
+    if (eye_is_coloured(channels, task))
+        return eye_linear(pixel[task->high]) - eye_linear(pixel[task->low]);
+    return eye_linear_sixteenths(eye_brightness(pixel, channels, task));
 }
 
-/* Light and signal of one band by column: the mean of up to ROWS_A_BAND rows. */
+/* Light and signal of one band by column, between two rows: the mean of up to ROWS_A_BAND. */
 static void fill_band(const eye_picture *p, const eye_task *task, double from, double to,
                       int first, int step, int columns, band *out)
 {
     int top = (int)ceil(from), bottom = (int)floor(to);
     if (bottom < top)
         top = bottom = (int)lround((from + to) / 2);
-    top = clamp(top, 0, p->rows - 1);
-    bottom = clamp(bottom, 0, p->rows - 1);
+    top = eye_clamp(top, 0, p->rows - 1);
+    bottom = eye_clamp(bottom, 0, p->rows - 1);
     int count = bottom - top + 1, used = count < ROWS_A_BAND ? count : ROWS_A_BAND;
     double middle = 0;
     memset(out->light, 0, sizeof *out->light * (size_t)columns);
@@ -54,7 +55,7 @@ static void fill_band(const eye_picture *p, const eye_task *task, double from, d
         const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
         middle += y;
         for (int c = 0; c < columns; c++) {
-            int x = clamp(first + c * step, 0, p->columns - 1);
+            int x = eye_clamp(first + c * step, 0, p->columns - 1);
             const uint8_t *pixel = row + x * p->channels;
             out->light[c] += light_of(pixel, p->channels, task);
             out->signal[c] += (float)eye_signal(pixel, p->channels, task);
@@ -72,7 +73,7 @@ static void fill_band(const eye_picture *p, const eye_task *task, double from, d
 static void cap_signal(band *bands, int n, int columns, int at)
 {
     float most = 0;
-    at = clamp(at, 1, columns - 2);
+    at = eye_clamp(at, 1, columns - 2);
     for (int b = 0; b < n; b++)
         if (bands[b].weight > 0)
             for (int c = at - 1; c <= at + 1; c++)
@@ -121,10 +122,10 @@ static double find_lean(const band *bands, int n, int columns, int step, double 
 {
     float values[EYE_MOST_COLUMNS];
     double best = -1, best_lean = 0;
-    double apart = 0.4 * wide / length;
+    double apart = 0.4 * wide / length; /* ends of the code move by less than half a width */
     int reach = (int)ceil(STEEPEST / apart);
-    if (reach > 12)
-        reach = 12;
+    if (reach > MOST_LEANS)
+        reach = MOST_LEANS;
     for (int i = -reach; i <= reach; i++) {
         double lean = i * apart;
         difference(bands, n, columns, step, row, lean, 0, values);
@@ -134,7 +135,7 @@ static double find_lean(const band *bands, int n, int columns, int step, double 
             best_lean = lean;
         }
     }
-    for (int round = 0; round < 2; round++) {
+    for (int round = 0; round < ROUNDS; round++) {
         /* A parabola through three energies has its top at the best lean. */
         double e[3];
         for (int i = 0; i < 3; i++) {
@@ -143,18 +144,19 @@ static double find_lean(const band *bands, int n, int columns, int step, double 
         }
         double bend = e[0] - 2 * e[1] + e[2];
         double move = bend < 0 ? 0.5 * (e[0] - e[2]) / bend : 0;
-        best_lean += apart * (move < -1 ? -1 : move > 1 ? 1 : move);
+        best_lean += apart * eye_limit(move, -1, 1);
         apart *= 0.4;
     }
     return best_lean;
 }
 
 /* Rows well inside every run of the code, as bands with the weights of bright - dark. */
-static int fill_bands(const eye_picture *p, const eye_task *task, const eye_candidate *c, const char *code,
-                      int segments, double unit, int first, int step, int columns, band *bands)
+static int fill_bands(const eye_picture *p, const eye_task *task, const eye_candidate *c,
+                      const char *code, int segments, double unit, int first, int step,
+                      int columns, band *bands)
 {
-    double trim = 0.5 * unit - 0.52;
-    trim = trim < 0 ? 0 : trim > 0.2 * unit + 0.6 ? 0.2 * unit + 0.6 : trim;
+    /* Kept off the edges, but for the middle row at least. */
+    double trim = eye_limit(0.5 * unit - 0.52, 0, 0.2 * unit + 0.6);
     int n = 0, ones = 0;
     for (int i = 1; i < segments - 1;) {
         int end = i;
@@ -180,14 +182,15 @@ static inline float share_of(double offset, double half)
     return (float)(inside < 0 ? 0 : inside > 1 ? 1 : inside);
 }
 
-static void fill_profile(const eye_picture *p, const eye_task *task, double top, double bottom, double unit,
-                         eye_upright *out)
+/* The straightened light by row, between the code's outer ends and a little beyond. */
+static void fill_profile(const eye_picture *p, const eye_task *task, double top, double bottom,
+                         double unit, eye_upright *out)
 {
     int bin = (int)(unit / ROWS_A_UNIT);
     bin = bin < 1 ? 1 : bin;
     int first = (int)floor(top - MARGIN * unit - 1), last = (int)ceil(bottom + MARGIN * unit + 1);
-    first = clamp(first, 0, p->rows - 1);
-    last = clamp(last, 0, p->rows - 1);
+    first = eye_clamp(first, 0, p->rows - 1);
+    last = eye_clamp(last, 0, p->rows - 1);
     int rows = (last - first + 1) / bin;
     rows = rows > EYE_MOST_ROWS ? EYE_MOST_ROWS : rows;
     out->bin = bin;
@@ -195,7 +198,7 @@ static void fill_profile(const eye_picture *p, const eye_task *task, double top,
     out->first = first - 0.5;
     out->channels = p->channels;
     double half = out->half_window;
-    int step = (int)(half / 2.5);
+    int step = (int)(half / COLUMNS_A_HALF);
     step = step < 1 ? 1 : step;
     for (int r = 0; r < rows; r++) {
         float light = 0, channel[3] = {0, 0, 0}, total = 0;
@@ -203,8 +206,8 @@ static void fill_profile(const eye_picture *p, const eye_task *task, double top,
             int y = first + r * bin + i;
             const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
             double middle = out->column + out->lean * (y - out->row);
-            int from = clamp((int)ceil(middle - half - 0.5), 0, p->columns - 1);
-            int to = clamp((int)floor(middle + half + 0.5), 0, p->columns - 1);
+            int from = eye_clamp((int)ceil(middle - half - 0.5), 0, p->columns - 1);
+            int to = eye_clamp((int)floor(middle + half + 0.5), 0, p->columns - 1);
             for (int x = from; x <= to; x += step) {
                 float share = share_of(x - middle, half);
                 const uint8_t *pixel = row + x * p->channels;
@@ -225,14 +228,45 @@ static void fill_profile(const eye_picture *p, const eye_task *task, double top,
     }
 }
 
+/* Where the strip's middle is: the window of its width that holds most, then the centre of mass of
+ * that and a little more. 0 where there is no strip. */
+static int find_middle(const eye_upright *u, double wide, double *middle)
+{
+    int window = (int)lround(wide / u->step);
+    window = window < 1 ? 1 : window;
+    double best = 0, at = 0, mass = 0, moment = 0;
+    for (int i = 0; i + window <= u->columns; i++) {
+        double sum = 0;
+        for (int k = 0; k < window; k++)
+            sum += u->across[i + k];
+        if (sum > best) {
+            best = sum;
+            at = u->across_first + (i + (window - 1) / 2.0) * u->step;
+        }
+    }
+    if (best / window < LEAST_SIGNAL)
+        return 0;
+    for (int i = 0; i < u->columns; i++) {
+        double x = u->across_first + i * u->step;
+        if (fabs(x - at) <= wide / 2 + u->step + 0.5 && u->across[i] > 0) {
+            mass += u->across[i];
+            moment += u->across[i] * x;
+        }
+    }
+    if (mass <= 0)
+        return 0;
+    *middle = moment / mass;
+    return 1;
+}
+
 /* Sets a candidate upright; the reason where that cannot be. ``aspect``: thickness in segments. */
 int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candidate *c,
                    const char *code, double aspect, eye_upright *out)
 {
     int segments = 2 * c->bits + 5;
     double unit = (c->bottom - c->top) / (segments - 4), wide = aspect * unit;
-    double length = (segments - 2) * unit;
-    double reach = wide + 4 + 0.03 * length;
+    double length = (segments - 2) * unit, row = (c->top + c->bottom) / 2;
+    double reach = wide + 4 + 0.03 * length; /* columns on either side, as it may lean */
     int step = (int)ceil((2 * reach + 1) / EYE_MOST_COLUMNS);
     if (step < (int)(wide / COLUMNS_ACROSS))
         step = (int)(wide / COLUMNS_ACROSS);
@@ -242,7 +276,6 @@ int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candida
     band bands[2 * EYE_MOST_BITS + 4];
     int n = fill_bands(p, task, c, code, segments, unit, first, step, columns, bands);
     cap_signal(bands, n, columns, (int)lround((c->column - first) / step));
-    double row = (c->top + c->bottom) / 2;
     double lean = find_lean(bands, n, columns, step, row, length, wide > 2 ? wide : 2);
     if (fabs(lean) > STEEPEST)
         return EYE_LEANS;
@@ -250,40 +283,15 @@ int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candida
     for (int i = 0; i < columns; i++)
         if (first + i * step < 0 || first + i * step >= p->columns)
             out->across[i] = 0; /* beyond the picture */
-    /* The strip is where a window of its width holds most. */
-    double best = 0, at = c->column;
-    int window = (int)lround(wide / step);
-    window = window < 1 ? 1 : window;
-    for (int i = 0; i + window <= columns; i++) {
-        double sum = 0;
-        for (int k = 0; k < window; k++)
-            sum += out->across[i + k];
-        if (sum > best) {
-            best = sum;
-            at = first + (i + (window - 1) / 2.0) * step;
-        }
-    }
-    /* Then the centre of mass within a little more. */
-    double mass = 0, moment = 0;
-    for (int i = 0; i < columns; i++) {
-        double x = first + i * step;
-        if (fabs(x - at) <= wide / 2 + step + 0.5 && out->across[i] > 0) {
-            mass += out->across[i];
-            moment += out->across[i] * x;
-        }
-    }
-    if (mass <= 0 || best / window < LEAST_SIGNAL)
-        return EYE_NO_CONTRAST;
-    difference(bands, n, columns, step, row, lean, 1, out->across);
-    out->column = moment / mass;
     out->row = row;
     out->lean = lean;
     out->columns = columns;
     out->step = step;
     out->across_first = first;
-    out->half_window = LOOKED_AT * wide / 2;
-    if (out->half_window < 0.6)
-        out->half_window = 0.6;
+    if (!find_middle(out, wide, &out->column))
+        return EYE_NO_CONTRAST;
+    difference(bands, n, columns, step, row, lean, 1, out->across);
+    out->half_window = fmax(LOOKED_AT * wide / 2, LEAST_LOOKED_AT);
     fill_profile(p, task, c->top - 2 * unit, c->bottom + 2 * unit, unit, out);
     return EYE_READ;
 }

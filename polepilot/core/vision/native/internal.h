@@ -1,0 +1,162 @@
+/* What the kernel's files share. */
+#ifndef POLEPILOT_INTERNAL_H
+#define POLEPILOT_INTERNAL_H
+
+#include "eye.h"
+
+#define EYE_MOST_CANDIDATES 24
+#define EYE_MOST_ROWS 512    /* of a profile: about 4 a segment are needed */
+#define EYE_MOST_COLUMNS 160 /* of a profile across */
+#define EYE_FAINTEST 16      /* grey levels of colour that are none */
+
+/* ---- the steps ---- */
+
+/* Neighbouring columns that show one code, good to about a pixel. */
+typedef struct {
+    int bits, id;
+    double column;
+    double top, bottom;        /* the inner borders of the end bars: after segment 2, before N - 2 */
+    int evidence;              /* contrast, summed up over the columns that agreed */
+    int open_top, open_bottom; /* the end bar's end is not to be seen */
+} eye_candidate;
+
+/* A straightened strip. */
+typedef struct {
+    int rows;                        /* of the profile, */
+    int bin;                         /* each the mean of so many of the picture */
+    int channels;
+    double first;                    /* the upper border of row 0 */
+    float light[EYE_MOST_ROWS];      /* linear brightness */
+    float channel[EYE_MOST_ROWS][3]; /* the same for every channel */
+    double column, row, lean;        /* the strip's middle */
+    int columns;                     /* of ``across``, */
+    int step;                        /* each so many of the picture apart */
+    double across_first;             /* column of entry 0 */
+    float across[EYE_MOST_COLUMNS];  /* bright minus dark by column */
+    double half_window;              /* half the columns that the profile averages */
+} eye_upright;
+
+/* A code's place and size along the strip. */
+typedef struct {
+    double middle, unit;         /* row of the code's middle; rows per segment there */
+    double sag, blur;            /* as in eye_strip */
+    double growth;               /* rows by which bright segments seem to grow at either end */
+    double unit_sigma, sag_sigma; /* standard deviations: share of unit; of sag */
+    double noise;                /* rms rest of the fit, of bright - dark */
+} eye_scale;
+
+/* Its place across. */
+typedef struct {
+    double column, half, blur; /* middle, half width, softness of the sides; columns */
+    double sigma;              /* of ``column`` */
+    double front, noise;       /* as in eye_strip: front, side_noise */
+    int sides;
+} eye_side;
+
+/* Each says in its file what it does; those that return a reason return one of enum eye_reason. */
+int eye_search(const eye_picture *picture, const eye_task *task, eye_candidate *found);
+int eye_straighten(const eye_picture *picture, const eye_task *task,
+                   const eye_candidate *candidate, const char *code, double aspect,
+                   eye_upright *out);
+int eye_fit_scale(const eye_upright *upright, const eye_task *task, const char *code,
+                  const eye_candidate *candidate, int sharp, eye_scale *out);
+void eye_refine_scale(const eye_upright *upright, const eye_task *task, const char *code,
+                      const eye_candidate *candidate, eye_scale *scale);
+int eye_segment_levels(const eye_upright *upright, const eye_scale *scale, int segments,
+                       double levels[][3]);
+int eye_read(const eye_task *task, double levels[][3], int segments, int channels, double noise,
+             double width, int open, char *code, double *tint);
+int eye_fit_side(const eye_picture *picture, const eye_upright *upright, double half, int flat,
+                 eye_side *out);
+int eye_covered(const eye_picture *picture, const eye_upright *upright, const eye_scale *scale,
+                const eye_side *side, const char *code, double levels[][3], int segments,
+                double noise);
+
+/* ---- numbers ---- */
+
+int eye_solve(double *matrix, double *right, int n, int rights);
+int eye_decode(const char *code, int segments);
+void eye_encode(int id, int bits, char *code);
+
+static inline int eye_clamp(int value, int low, int high)
+{
+    return value < low ? low : value > high ? high : value;
+}
+
+static inline double eye_limit(double value, double low, double high)
+{
+    return value < low ? low : value > high ? high : value;
+}
+
+/* Tables, filled before anything runs. */
+#define EYE_STEPS 1200 /* of the normal distribution, from -EYE_REACH to EYE_REACH */
+#define EYE_REACH 6.0
+extern float eye_cumulative_table[EYE_STEPS + 2], eye_bell_table[EYE_STEPS + 2];
+extern float eye_linear_table[256], eye_fine_table[4096];
+
+static inline double eye_look_up(const float *table, double z)
+{
+    double place = (z + EYE_REACH) * (EYE_STEPS / (2 * EYE_REACH));
+    int at = (int)place;
+    double rest = place - at;
+    return table[at] + rest * (table[at + 1] - table[at]);
+}
+
+/* The normal distribution's cumulative function, to 1e-5. */
+static inline double eye_cumulative(double z)
+{
+    if (!(z > -EYE_REACH)) /* or no number: there is no table for that */
+        return 0.0;
+    return z >= EYE_REACH ? 1.0 : eye_look_up(eye_cumulative_table, z);
+}
+
+/* The normal distribution's density, to 1e-5. */
+static inline double eye_bell(double z)
+{
+    return z > -EYE_REACH && z < EYE_REACH ? eye_look_up(eye_bell_table, z) : 0.0;
+}
+
+/* ---- light and colour ---- */
+
+/* Linear light of a grey level (0 to 255), and of sixteenths of one (0 to 4080). */
+static inline float eye_linear(int grey) { return eye_linear_table[grey]; }
+static inline float eye_linear_sixteenths(int level) { return eye_fine_table[level]; }
+
+/* Brightness of a pixel, in sixteenths of a grey level. */
+static inline int eye_brightness(const uint8_t *pixel, int channels, const eye_task *task)
+{
+    if (channels == 1)
+        return 16 * pixel[0];
+    return (task->weights[0] * pixel[0] + task->weights[1] * pixel[1] +
+            task->weights[2] * pixel[2]) >> 4;
+}
+
+/* Whether the paint's colour tells it from other things: not in grey pictures, nor white paint. */
+static inline int eye_is_coloured(int channels, const eye_task *task)
+{
+    return channels == 3 && task->low >= 0;
+}
+
+/* How much of the paint's colour a pixel has, in quarters of a grey level. The weights keep grey
+ * below nothing in light that is a little warm. */
+static inline int eye_colour(const uint8_t *pixel, const eye_task *task)
+{
+    return 6 * pixel[task->high] - 7 * pixel[task->low];
+}
+
+/* How bright the paint's colour is, in grey levels: brightness where there is colour.
+ *
+ * Where there is colour enough the brightness (half as much again, about the brightest channel of
+ * orange) tells bright from black: JPEG and cheap cameras keep it twice as sharp as colour. */
+static inline int eye_signal(const uint8_t *pixel, int channels, const eye_task *task)
+{
+    int value = (3 * eye_brightness(pixel, channels, task)) >> 5;
+    if (eye_is_coloured(channels, task)) {
+        int colour = eye_colour(pixel, task) / 4;
+        value = (colour < value ? colour : value) - EYE_FAINTEST;
+        value = value < 0 ? 0 : value;
+    }
+    return value > 255 ? 255 : value;
+}
+
+#endif

@@ -1,0 +1,44 @@
+/* Between the files of the search: runs.c, match.c, comb.c, gather.c, search.c. */
+#ifndef POLEPILOT_SEARCH_H
+#define POLEPILOT_SEARCH_H
+
+#include "internal.h"
+
+#define EYE_MOST_RUNS 384 /* bright runs in one column */
+#define EYE_MOST_HITS 3000 /* a picture full of stripes has no landmark */
+#define EYE_MOST_LENGTHS 4 /* different numbers of bits that are looked for */
+#define EYE_LEAST_STEP 12  /* grey levels of signal; less is noise */
+#define EYE_SHORTEST 1.15f /* rows per segment; shorter ones cannot be told apart */
+#define EYE_APART 2        /* every second column is looked at */
+
+/* A bright stretch of one column's signal. */
+typedef struct {
+    float start, end; /* rows, between pixels */
+    uint8_t peak;
+    uint8_t valley; /* the darkest between this run and the next */
+} eye_run;
+
+/* A code in one column. */
+typedef struct {
+    float column, top, bottom; /* the inner part: between the end bars */
+    int16_t bits, id;
+    int8_t open_top, open_bottom; /* an end bar's end is not to be seen */
+    uint8_t contrast;             /* of the dimmest bright segment and the brightest dark one */
+} eye_hit;
+
+/* All of a picture. */
+typedef struct {
+    const eye_picture *picture;
+    const eye_task *task;
+    int n_bits, bits[EYE_MOST_LENGTHS];
+    int n_hits;
+    eye_hit hits[EYE_MOST_HITS];
+} eye_hits;
+
+int eye_find_runs(const uint8_t *signal, int rows, eye_run *runs);
+int eye_smooth_runs(const eye_run *runs, int count, eye_run *smooth);
+void eye_match_runs(eye_hits *hits, const eye_run *runs, int count, float column);
+void eye_match_comb(eye_hits *hits, const uint8_t *signal, int first, int last, int x, int known);
+int eye_gather(eye_hits *hits, eye_candidate *found);
+
+#endif

@@ -7,6 +7,7 @@ Everything here is in pixels and linear light; `measure` makes metres and radian
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -138,7 +139,8 @@ class Kernel:
         paint: what their bright segments are painted with; grey pictures show any of them.
 
     Raises:
-        InternalError: the library is missing or belongs to another version.
+        InternalError: the library is missing or belongs to another version; an id or the constant
+            makes no sense.
     """
 
     def __init__(
@@ -147,6 +149,11 @@ class Kernel:
         constant: float,
         paint: Paint = ORANGE,
     ) -> None:
+        if not (0 < constant < math.inf and all(0 < number < IDS for number in kinds)):
+            raise InternalError(
+                f"a camera constant of {constant} and the ids {sorted(kinds)}: expected more than 0 "
+                f"pixels, and ids from 1 to {IDS - 1}."
+            )
         self._look = _library().eye_look
         high, low = paint.channels
         task = _Task(high=high, low=-1 if low is None else low)

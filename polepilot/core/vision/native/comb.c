@@ -6,6 +6,8 @@
 #define GAP 22             /* rows without colour that a stretch may have */
 #define LEAST_SEGMENTS 9   /* rows of colour at least, in the shortest segments */
 #define BESIDE 4           /* rows above and below a stretch that take part */
+#define APART 4            /* columns from the strip's middle to what is beside it, */
+#define LEAK 0.4f          /* of which so much is blurred into it */
 #define NEAR 3.3f          /* rows per segment from which on colour parts the segments well */
 #define ROUGH_REST 0.15f   /* mean square that a code may leave over at whole pixels, of bright - dark, */
 #define MOST_REST 0.06f    /* and at fractions of a pixel */
@@ -19,7 +21,8 @@ typedef struct {
     int id;
 } fit;
 
-/* The running sum of the brightness of three columns, grey levels of one. */
+/* The running sum of the brightness of three columns, grey levels of one. What is beside them is in
+ * part blurred into them: that part of a wall's or floor's pattern is taken off again. */
 static void sum_brightness(const eye_hits *hits, int x, int from, int to, float *sum)
 {
     const eye_picture *p = hits->picture;
@@ -27,10 +30,12 @@ static void sum_brightness(const eye_hits *hits, int x, int from, int to, float 
     sum[0] = 0;
     for (int y = from; y < to; y++) {
         const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
-        int total = 0;
+        int total = 0, beside = 0;
         for (int side = -1; side <= 1; side++)
             total += eye_brightness(row + eye_clamp(x + side, 0, last) * n, n, hits->task);
-        sum[y - from + 1] = sum[y - from] + (float)total / 48;
+        for (int side = -APART; side <= APART; side += 2 * APART)
+            beside += eye_brightness(row + eye_clamp(x + side, 0, last) * n, n, hits->task);
+        sum[y - from + 1] = sum[y - from] + (float)total / 48 - LEAK * (float)beside / 32;
     }
 }
 

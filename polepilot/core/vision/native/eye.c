@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#define LEAST_ROWS 8           /* of a picture; no code has fewer */
 #define ATTEMPTS 2
 #define MOST_MISFIT 7.0        /* with one bright bit, */
 #define MISFIT_A_BIT 1.5       /* and more for every further one: the more there is to fit */
@@ -175,7 +176,7 @@ int32_t eye_look(const eye_picture *picture, const eye_task *task, eye_strip *st
                  int32_t capacity)
 {
     eye_candidate candidates[EYE_MOST_CANDIDATES];
-    if (picture->rows < 8 || picture->columns < 1)
+    if (picture->rows < LEAST_ROWS || picture->columns < 1 || capacity < 1)
         return 0;
     int n = eye_search(picture, task, candidates);
     if (n < 0)

@@ -89,8 +89,8 @@ typedef struct {
 
 #define EYE_PUBLIC __attribute__((visibility("default")))
 
-/* Looks at a picture; returns how many strips were written (rejected ones too), or -1 where there
- * is no memory. */
+/* Looks at a picture of 1 or 3 channels; returns how many strips were written (rejected ones too),
+ * ``capacity`` at most, or -1 where there is no memory. What picture and task say is not checked. */
 EYE_PUBLIC int32_t eye_look(const eye_picture *picture, const eye_task *task, eye_strip *strips,
                             int32_t capacity);
 EYE_PUBLIC int32_t eye_version(void);

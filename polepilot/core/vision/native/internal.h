@@ -28,6 +28,7 @@ typedef struct {
     double first;                    /* the upper border of row 0 */
     float light[EYE_MOST_ROWS];      /* linear brightness */
     float channel[EYE_MOST_ROWS][3]; /* the same for every channel */
+    float beside[EYE_MOST_ROWS][4];  /* every channel and brightness just beside the strip */
     double column, row, lean;        /* the strip's middle */
     int columns;                     /* of ``across``, */
     int step;                        /* each so many of the picture apart */
@@ -43,6 +44,7 @@ typedef struct {
     double growth;               /* rows by which bright segments seem to grow at either end */
     double unit_sigma, sag_sigma; /* standard deviations: share of unit; of sag */
     double noise;                /* rms rest of the fit, of bright - dark */
+    double leak;                 /* share of what is beside the strip that is blurred into it */
 } eye_scale;
 
 /* Its place across. */
@@ -62,6 +64,7 @@ int eye_fit_scale(const eye_upright *upright, const eye_task *task, const char *
                   const eye_candidate *candidate, int sharp, eye_scale *out);
 void eye_refine_scale(const eye_upright *upright, const eye_task *task, const char *code,
                       const eye_candidate *candidate, eye_scale *scale);
+void eye_take_leak(eye_upright *upright, double leak);
 int eye_segment_levels(const eye_upright *upright, const eye_scale *scale, int segments,
                        double levels[][3]);
 int eye_read(const eye_task *task, double levels[][3], int segments, int channels, double noise,

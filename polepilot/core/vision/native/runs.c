@@ -53,9 +53,9 @@ static int pass_dark(const uint8_t *s, int rows, int y, int rise, extremum *vall
             while (y + 8 <= rows && (memcpy(&eight, s + y, 8), eight == 0))
                 y += 8;
             level = 0;
+            at = y > 0 ? y - 1 : 0;
             if (y >= rows)
                 break;
-            at = y > 0 ? y - 1 : 0;
         }
         if (s[y] <= level) {
             level = s[y];

@@ -8,6 +8,7 @@
 #include <math.h>
 #include <string.h>
 
+#define LARGEST 1e6     /* pixels; no strip is larger, nor could its columns be counted with an int */
 #define MARGIN 1.3      /* segments above and below the code that are kept */
 #define STEEPEST 0.118  /* columns per row: 60 degrees/s, a slow shutter and 2 degrees of roll */
 #define MOST_LEANS 12   /* that are tried to either side at first */
@@ -18,7 +19,9 @@
 #define LEAST_LOOKED_AT 0.6 /* and columns at the least */
 #define COLUMNS_A_HALF 2.5 /* more columns than this in the half of that are left out */
 #define LEAST_SIGNAL 4.0 /* grey levels of bright minus dark */
-#define ROWS_A_UNIT 2.0 /* more rows per segment than this are averaged */
+#define ALL_ROWS 4.0    /* rows per segment up to which each is kept, */
+#define ROWS_A_UNIT 5.0 /* and how many are kept if there are many more */
+#define BESIDE 2.0      /* columns from the strip's side to what is beside it */
 
 /* The rows of one run of the code, averaged. */
 typedef struct {
@@ -183,11 +186,27 @@ static inline float share_of(double offset, double half)
 }
 
 /* The straightened light by row, between the code's outer ends and a little beyond. */
+/* Light of every channel and brightness in one row just beside the strip, both sides together. */
+static void fill_beside(const eye_picture *p, const eye_task *task, int y, const eye_upright *u,
+                        float *beside)
+{
+    double middle = u->column + u->lean * (y - u->row), away = u->half_window / LOOKED_AT + BESIDE;
+    const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
+    memset(beside, 0, 4 * sizeof *beside);
+    for (int k = 0; k < 4; k++) {
+        double x = middle + (k < 2 ? -1 : 1) * (away + k % 2);
+        const uint8_t *pixel = row + eye_clamp((int)floor(x + 0.5), 0, p->columns - 1) * p->channels;
+        for (int c = 0; c < p->channels; c++)
+            beside[c] += eye_linear(pixel[c]) / 4;
+        beside[3] += eye_linear_sixteenths(eye_brightness(pixel, p->channels, task)) / 4;
+    }
+}
+
 static void fill_profile(const eye_picture *p, const eye_task *task, double top, double bottom,
                          double unit, eye_upright *out)
 {
-    int bin = (int)(unit / ROWS_A_UNIT);
-    bin = bin < 1 ? 1 : bin;
+    int bin = unit < ALL_ROWS ? 1 : (int)(unit / ROWS_A_UNIT);
+    bin = bin < 2 && unit >= ALL_ROWS ? 2 : bin;
     int first = (int)floor(top - MARGIN * unit - 1), last = (int)ceil(bottom + MARGIN * unit + 1);
     first = eye_clamp(first, 0, p->rows - 1);
     last = eye_clamp(last, 0, p->rows - 1);
@@ -222,6 +241,7 @@ static void fill_profile(const eye_picture *p, const eye_task *task, double top,
             }
         }
         float scale = total > 1e-6f ? 1 / total : 0;
+        fill_beside(p, task, first + r * bin + bin / 2, out, out->beside[r]);
         out->light[r] = light * scale;
         for (int k = 0; k < 3; k++)
             out->channel[r][k] = channel[k] * scale;
@@ -266,6 +286,8 @@ int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candida
     int segments = 2 * c->bits + 5;
     double unit = (c->bottom - c->top) / (segments - 4), wide = aspect * unit;
     double length = (segments - 2) * unit, row = (c->top + c->bottom) / 2;
+    if (wide > LARGEST || length > LARGEST)
+        return EYE_WRONG_WIDTH;
     double reach = wide + 4 + 0.03 * length; /* columns on either side, as it may lean */
     int step = (int)ceil((2 * reach + 1) / EYE_MOST_COLUMNS);
     if (step < (int)(wide / COLUMNS_ACROSS))

@@ -14,6 +14,7 @@ enum {
     EYE_DARK,
     EYE_DARK_TILT,
     EYE_BELOW,
+    EYE_LEAK, /* share of what is beside the strip that is blurred into it */
     EYE_LINEAR,
     EYE_MIDDLE = EYE_LINEAR, /* row of the code's middle */
     EYE_UNIT,                /* rows per segment there */

@@ -75,7 +75,7 @@ static void note_scale(const eye_scale *scale, double thick, eye_strip *out)
 /* Fits and reads a straightened strip; the reason where it is no code. ``id`` is what the search
  * has read, and then what the levels say. */
 static int read_strip(const eye_task *task, const eye_candidate *candidate,
-                      const eye_upright *upright, double thick, int sharp, int *id,
+                      eye_upright *upright, double thick, int sharp, int *id,
                       eye_scale *scale, double levels[][3], eye_strip *out)
 {
     int segments = 2 * candidate->bits + 5, wanted = *id;
@@ -85,6 +85,7 @@ static int read_strip(const eye_task *task, const eye_candidate *candidate,
     if (reason != EYE_READ)
         return reason;
     note_scale(scale, thick, out);
+    eye_take_leak(upright, scale->leak);
     if (!eye_segment_levels(upright, scale, segments, levels))
         return EYE_NO_SCALE;
     double noise = scale->noise / sqrt(scale->unit > 1 ? scale->unit : 1);

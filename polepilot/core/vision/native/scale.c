@@ -12,6 +12,8 @@
 #define BLUR_GUESS 0.55   /* rows */
 #define BLUR_PRIOR 0.4    /* rows by which blur may differ from that, about */
 #define LEAST_BLUR 0.2    /* rows */
+#define LEAK_PRIOR 0.3    /* share of what is beside the strip that blur mixes into it */
+#define LEAK_RIDGE 1e-2
 #define GROWTH_PRIOR 0.15 /* rows by which bright segments may seem to grow: glare, tone curve */
 #define PITCH_PRIOR 0.03  /* radians by which camera or pole may lean towards each other */
 #define DARK_NOISE 0.01   /* light whose photons are as many as what darkness has of noise */
@@ -24,6 +26,11 @@
 #define LEVEL_RIDGE 1e-4  /* rows of nothing: hold the levels that no row shows */
 
 /* The sums of one round of the fit. */
+/* Light along the strip in one channel, and just beside it, there from its mean. */
+typedef struct {
+    double light[EYE_MOST_ROWS], beside[EYE_MOST_ROWS];
+} profile;
+
 typedef struct {
     double rests[EYE_MOST_ROWS]; /* what is left over, weighted as the rows are, */
     double variance;             /* of that */
@@ -65,8 +72,18 @@ static void mirror(double *normal)
     }
 }
 
+/* Takes the mean of some rows off all of them. */
+static void center(double *values, int from, int to)
+{
+    double mean = 0;
+    for (int i = from; i < to; i++)
+        mean += values[i] / (to - from);
+    for (int i = from; i < to; i++)
+        values[i] -= mean;
+}
+
 /* First values for the levels: linear least squares with the edges where they are. */
-static int fit_levels(const eye_upright *u, const double *light, const eye_wave *wave,
+static int fit_levels(const eye_upright *u, const profile *seen, const eye_wave *wave,
                       double *guess, int from, int to)
 {
     double matrix[EYE_LINEAR * EYE_LINEAR] = {0}, right[EYE_LINEAR] = {0}, row[EYE_PARAMETERS];
@@ -74,15 +91,15 @@ static int fit_levels(const eye_upright *u, const double *light, const eye_wave 
     eye_lay_out(wave, guess, &at);
     for (int i = from; i < to; i++) {
         double upper = u->first + i * u->bin;
-        eye_wave_row(wave, &at, guess, upper, upper + u->bin, row);
+        eye_wave_row(wave, &at, guess, upper, upper + u->bin, seen->beside[i], row);
         for (int a = 0; a < EYE_LINEAR; a++) {
-            right[a] += row[a] * light[i];
+            right[a] += row[a] * seen->light[i];
             for (int b = 0; b < EYE_LINEAR; b++)
                 matrix[a * EYE_LINEAR + b] += row[a] * row[b];
         }
     }
     for (int a = 0; a < EYE_LINEAR; a++)
-        matrix[a * EYE_LINEAR + a] += LEVEL_RIDGE;
+        matrix[a * EYE_LINEAR + a] += a == EYE_LEAK ? LEAK_RIDGE : LEVEL_RIDGE;
     if (!eye_solve(matrix, right, EYE_LINEAR, 1))
         return 0;
     memcpy(guess, right, sizeof right);
@@ -105,7 +122,7 @@ static void choose_rows(const eye_upright *u, const eye_wave *wave, const double
 
 /* Compares the rows with the model: the normal equations, and weak priors for what a code cannot
  * tell. */
-static void compare(const eye_upright *u, const double *light, const eye_wave *wave,
+static void compare(const eye_upright *u, const profile *seen, const eye_wave *wave,
                     const double *guess, double constant, int from, int to, equations *out)
 {
     double row[EYE_PARAMETERS], weighted = 0, plain = 0;
@@ -115,9 +132,10 @@ static void compare(const eye_upright *u, const double *light, const eye_wave *w
     eye_lay_out(wave, guess, &at);
     for (int i = from; i < to; i++) {
         double upper = u->first + i * u->bin;
-        double rest = light[i] - eye_wave_row(wave, &at, guess, upper, upper + u->bin, row);
+        double rest = seen->light[i] - eye_wave_row(wave, &at, guess, upper, upper + u->bin,
+                                                    seen->beside[i], row);
         /* Photon noise: the variance of light grows with the light. */
-        double weight = 1 / (fabs(light[i]) + DARK_NOISE);
+        double weight = 1 / (fabs(seen->light[i]) + DARK_NOISE);
         add_row(out->normal, out->right, row, rest, weight);
         weighted += rest * rest * weight;
         plain += rest * rest;
@@ -126,6 +144,7 @@ static void compare(const eye_upright *u, const double *light, const eye_wave *w
     int free = to - from - EYE_PARAMETERS;
     out->plain = plain;
     out->variance = weighted / (free > 4 ? free : 4) + 1e-7;
+    pull(out, EYE_LEAK, -guess[EYE_LEAK], LEAK_PRIOR);
     pull(out, EYE_GROWTH, -guess[EYE_GROWTH], GROWTH_PRIOR);
     pull(out, EYE_BLUR, BLUR_GUESS - guess[EYE_BLUR], BLUR_PRIOR);
     out->sag_pull = pull(out, EYE_SAG, -guess[EYE_SAG], PITCH_PRIOR * guess[EYE_UNIT] / constant);
@@ -187,6 +206,7 @@ static int conclude(equations *sums, const double *guess, int rows, eye_scale *o
     out->sag = guess[EYE_SAG];
     out->blur = guess[EYE_BLUR];
     out->growth = guess[EYE_GROWTH];
+    out->leak = guess[EYE_LEAK];
     out->unit_sigma = sqrt(variance * inverse[EYE_UNIT * 2]) / guess[EYE_UNIT];
     out->sag_sigma = 1.0;
     /* Sag is shared by all poles of a picture and weighed against them later: here it is what the
@@ -202,7 +222,7 @@ static int conclude(equations *sums, const double *guess, int rows, eye_scale *o
 
 /* Fits the whole code to one channel's light; the reason where it does not settle near the guess,
  * which is another channel's fit or, without that, the candidate. */
-static int fit_channel(const eye_upright *u, const double *light, const char *code,
+static int fit_channel(const eye_upright *u, profile *seen, const char *code,
                        const eye_candidate *candidate, double constant, const eye_scale *begin,
                        eye_scale *out)
 {
@@ -218,10 +238,11 @@ static int fit_channel(const eye_upright *u, const double *light, const char *co
     guess[EYE_BLUR] = begin ? begin->blur : BLUR_GUESS;
     guess[EYE_GROWTH] = begin ? begin->growth : 0;
     choose_rows(u, &wave, guess, candidate->open_top, candidate->open_bottom, &from, &to);
-    if (to - from < EYE_PARAMETERS || !fit_levels(u, light, &wave, guess, from, to))
+    center(seen->beside, from, to);
+    if (to - from < EYE_PARAMETERS || !fit_levels(u, seen, &wave, guess, from, to))
         return EYE_NO_SCALE;
     for (int round = 0; round < ROUNDS; round++) {
-        compare(u, light, &wave, guess, constant, from, to, &sums);
+        compare(u, seen, &wave, guess, constant, from, to, &sums);
         double moved = move(&sums, unit, segments, guess);
         if (moved < 0 || !(fabs(guess[EYE_MIDDLE] - middle) <= unit + 1) ||
             !(fabs(guess[EYE_UNIT] / unit - 1) <= 0.2))
@@ -249,11 +270,13 @@ static void merge(double *value, double *sigma, double other, double other_sigma
 int eye_fit_scale(const eye_upright *u, const eye_task *task, const char *code,
                   const eye_candidate *candidate, int sharp, eye_scale *out)
 {
-    double light[EYE_MOST_ROWS];
+    profile seen;
     int channel = u->channels == 1 ? 0 : task->high;
-    for (int i = 0; i < u->rows; i++)
-        light[i] = sharp ? u->light[i] : u->channel[i][channel];
-    return fit_channel(u, light, code, candidate, task->constant, NULL, out);
+    for (int i = 0; i < u->rows; i++) {
+        seen.light[i] = sharp ? u->light[i] : u->channel[i][channel];
+        seen.beside[i] = u->beside[i][sharp ? 3 : channel];
+    }
+    return fit_channel(u, &seen, code, candidate, task->constant, NULL, out);
 }
 
 /* Fits a code again to the brightness, which cameras with a mosaic of colour filters and JPEG keep
@@ -261,11 +284,13 @@ int eye_fit_scale(const eye_upright *u, const eye_task *task, const char *code,
 void eye_refine_scale(const eye_upright *u, const eye_task *task, const char *code,
                       const eye_candidate *candidate, eye_scale *out)
 {
-    double light[EYE_MOST_ROWS];
+    profile seen;
     eye_scale other;
-    for (int i = 0; i < u->rows; i++)
-        light[i] = u->light[i];
-    if (fit_channel(u, light, code, candidate, task->constant, out, &other) != EYE_READ)
+    for (int i = 0; i < u->rows; i++) {
+        seen.light[i] = u->light[i];
+        seen.beside[i] = u->beside[i][3];
+    }
+    if (fit_channel(u, &seen, code, candidate, task->constant, out, &other) != EYE_READ)
         return;
     /* One that went astray does not count. */
     if (other.noise > ASTRAY * out->noise && other.noise > USUAL_NOISE)

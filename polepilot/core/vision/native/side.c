@@ -9,7 +9,8 @@
 #include <math.h>
 #include <string.h>
 
-#define CELLS 8       /* strips of the surface in the model, */
+#define FEWEST_CELLS 8 /* strips of the surface in the model, */
+#define MOST_CELLS 32  /* each about a column wide: finer than the blur, */
 #define FINE_CELLS 24 /* and for its mean height */
 #define SHOWS 5.0     /* times the blur: light does not reach farther */
 #define ROUNDS 6
@@ -42,18 +43,19 @@ enum {
 /* The sums of one round of the fit. */
 typedef struct {
     double normal[PARAMETERS * PARAMETERS], right[PARAMETERS];
-    double plain, variance; /* of what is left over: sum of squares, variance */
+    double plain, variance; /* of what is left over: mean square at the better side, variance */
 } equations;
 
 /* One column of the model: basis of the levels and derivatives; returns the prediction. */
-static double model_column(double x, double size, const double *guess, int flat, double *row)
+static double model_column(double x, double size, const double *guess, int cells, int flat,
+                           double *row)
 {
     double middle = guess[MIDDLE], sharp = 1 / guess[BLUR], half = guess[HALF];
-    double weight = 2 * half / (CELLS * size);
+    double weight = 2 * half / (cells * size);
     memset(row, 0, sizeof(double) * PARAMETERS);
     double by_middle = 0, by_blur = 0, by_half = 0, sum = 0;
-    for (int i = 0; i < CELLS; i++) {
-        double u = (2 * i + 1.0) / CELLS - 1;
+    for (int i = 0; i < cells; i++) {
+        double u = (2 * i + 1.0) / cells - 1;
         double place = middle + half * u;
         double z0 = (x - size / 2 - place) * sharp, z1 = (x + size / 2 - place) * sharp;
         if (z1 < -SHOWS || z0 > SHOWS)
@@ -133,19 +135,31 @@ static void pull(equations *sums, int parameter, double off, double deviation)
     sums->right[parameter] += strength * off;
 }
 
+/* Mean square of what is left over on the strip and at its better side: clutter stands at one side
+ * of a pole, a wider post goes on at both. */
+static double on_and_beside(const double *zone, const int *size)
+{
+    double left = size[0] ? zone[0] / size[0] : HUGE_VAL;
+    double right = size[2] ? zone[2] / size[2] : HUGE_VAL;
+    int better = left < right ? 0 : 2, n = size[1] + 2 * size[better];
+    return n > 0 ? (zone[1] + 2 * zone[better]) / n : 0;
+}
+
 /* Compares the columns with the model: the normal equations. Priors: the width is known from the
  * range, and light does not run wild over the surface. */
 static void compare(const eye_upright *u, const double *guess, double half, double peak, int flat,
                     int from, int to, equations *out)
 {
-    double row[PARAMETERS];
+    double row[PARAMETERS], zone[3] = {0};
+    int size[3] = {0}, cells = eye_clamp((int)(2 * half), FEWEST_CELLS, MOST_CELLS);
     memset(out->normal, 0, sizeof out->normal);
     memset(out->right, 0, sizeof out->right);
-    out->plain = 0;
     for (int i = from; i < to; i++) {
         double x = u->across_first + i * u->step;
-        double rest = u->across[i] - model_column(x, u->step, guess, flat, row);
-        out->plain += rest * rest;
+        double rest = u->across[i] - model_column(x, u->step, guess, cells, flat, row);
+        int at = x < guess[MIDDLE] - guess[HALF] ? 0 : x > guess[MIDDLE] + guess[HALF] ? 2 : 1;
+        zone[at] += rest * rest;
+        size[at]++;
         for (int a = 0; a < PARAMETERS; a++) {
             out->right[a] += row[a] * rest;
             for (int b = 0; b < PARAMETERS; b++)
@@ -153,7 +167,9 @@ static void compare(const eye_upright *u, const double *guess, double half, doub
         }
     }
     int free = to - from - 4;
-    out->variance = out->plain / (free > 2 ? free : 2) + 1e-8 + 1e-4 * peak * peak;
+    double all = zone[0] + zone[1] + zone[2];
+    out->plain = on_and_beside(zone, size);
+    out->variance = all / (free > 2 ? free : 2) + 1e-8 + 1e-4 * peak * peak;
     pull(out, HALF, half - guess[HALF], WIDTH_PRIOR * half + 0.05);
     pull(out, BLUR, BLUR_GUESS - guess[BLUR], BLUR_PRIOR);
     pull(out, SLOPE, 0 - guess[SLOPE], LIGHT_PRIOR * peak);
@@ -221,7 +237,7 @@ int eye_fit_side(const eye_picture *p, const eye_upright *u, double half, int fl
     out->half = guess[HALF];
     out->blur = guess[BLUR];
     out->sigma = sqrt(sums.variance * inverse[MIDDLE]) + (cut ? CUT_SIGMA * half : 0);
-    out->noise = sqrt(sums.plain / (to - from)) / peak;
+    out->noise = sqrt(sums.plain) / peak;
     out->front = flat ? 1.0 : front_of(u, guess);
     int whole = guess[MIDDLE] - half >= -0.5 && guess[MIDDLE] + half <= p->columns - 0.5;
     out->sides = whole ? 2 : 1;

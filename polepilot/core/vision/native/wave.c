@@ -69,7 +69,7 @@ void eye_lay_out(const eye_wave *wave, const double *guess, eye_layout *out)
 /* One row of the model: the derivatives by all parameters; returns the light that it predicts. Rows
  * come in order. */
 double eye_wave_row(const eye_wave *wave, eye_layout *at, const double *guess, double upper,
-                    double lower, double *row)
+                    double lower, double beside, double *row)
 {
     int last_edge = wave->edges - 1;
     while (at->passed <= last_edge && at->place[at->passed] < upper - at->reach)
@@ -110,6 +110,7 @@ double eye_wave_row(const eye_wave *wave, eye_layout *at, const double *guess, d
     row[EYE_DARK] = dark;
     row[EYE_DARK_TILT] = dark * shift;
     row[EYE_BELOW] = last;
+    row[EYE_LEAK] = beside;
     row[EYE_MIDDLE] = by_middle;
     row[EYE_UNIT] = by_unit;
     row[EYE_BLUR] = by_blur;
@@ -119,6 +120,20 @@ double eye_wave_row(const eye_wave *wave, eye_layout *at, const double *guess, d
     for (int i = 0; i < EYE_LINEAR; i++)
         sum += row[i] * guess[i];
     return sum;
+}
+
+/* Takes what is blurred into the strip from beside it out of its light. */
+void eye_take_leak(eye_upright *u, double leak)
+{
+    float mean[4] = {0}, share = (float)leak;
+    for (int i = 0; i < u->rows; i++)
+        for (int c = 0; c < 4; c++)
+            mean[c] += u->beside[i][c] / (float)u->rows;
+    for (int i = 0; i < u->rows; i++) {
+        for (int c = 0; c < u->channels; c++)
+            u->channel[i][c] -= share * (u->beside[i][c] - mean[c]);
+        u->light[i] -= share * (u->beside[i][3] - mean[3]);
+    }
 }
 
 /* Light of every segment with its neighbours' blur taken out, per channel; 0 where it cannot be

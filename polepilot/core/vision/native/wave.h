@@ -43,6 +43,6 @@ double eye_row_of(const double *guess, double place);
 void eye_wave_of(const char *code, int segments, eye_wave *out);
 void eye_lay_out(const eye_wave *wave, const double *guess, eye_layout *out);
 double eye_wave_row(const eye_wave *wave, eye_layout *at, const double *guess, double upper,
-                    double lower, double *row);
+                    double lower, double beside, double *row);
 
 #endif

@@ -12,7 +12,7 @@
 #define USUAL_SIDE_NOISE 0.06  /* rms rest of the fit across, of its peak */
 #define USUAL_PITCH 0.035      /* radians between camera and pole */
 #define USUAL_TINT 0.12        /* as in eye_strip */
-#define USUAL_SIGMA 0.006      /* of the unit, as a share of it */
+#define USUAL_SIGMA 0.0052      /* of the unit, as a share of it */
 #define SURE 4e-4              /* share of the unit: no second fit makes it better */
 #define FEW_ROWS 6.0           /* per segment: JPEG blurs colour by up to as much */
 #define MOST_BLUR 0.5          /* rows, and three tenths of a segment */

@@ -13,7 +13,8 @@
 #define BLUR_PRIOR 0.4    /* rows by which blur may differ from that, about */
 #define LEAST_BLUR 0.2    /* rows */
 #define LEAK_PRIOR 0.3    /* share of what is beside the strip that blur mixes into it */
-#define LEAK_RIDGE 1e-2
+#define THIN 1.0          /* half of the columns looked at, of a strip that blur fills so far */
+#define LEAK_RIDGE 1.0
 #define GROWTH_PRIOR 0.15 /* rows by which bright segments may seem to grow: glare, tone curve */
 #define PITCH_PRIOR 0.03  /* radians by which camera or pole may lean towards each other */
 #define DARK_NOISE 0.01   /* light whose photons are as many as what darkness has of noise */
@@ -144,7 +145,9 @@ static void compare(const eye_upright *u, const profile *seen, const eye_wave *w
     int free = to - from - EYE_PARAMETERS;
     out->plain = plain;
     out->variance = weighted / (free > 4 ? free : 4) + 1e-7;
-    pull(out, EYE_LEAK, -guess[EYE_LEAK], LEAK_PRIOR);
+    /* Little is blurred into a wide strip; whatever covers it is beside it as well, and no leak. */
+    double thin = THIN / fmax(u->half_window, THIN);
+    pull(out, EYE_LEAK, -guess[EYE_LEAK], LEAK_PRIOR * thin * thin);
     pull(out, EYE_GROWTH, -guess[EYE_GROWTH], GROWTH_PRIOR);
     pull(out, EYE_BLUR, BLUR_GUESS - guess[EYE_BLUR], BLUR_PRIOR);
     out->sag_pull = pull(out, EYE_SAG, -guess[EYE_SAG], PITCH_PRIOR * guess[EYE_UNIT] / constant);

@@ -8,8 +8,10 @@ the camera: names and passwords stay out of messages and logs.
 from __future__ import annotations
 
 import errno
+import queue
 import re
 import socket
+import threading
 import time
 from typing import Any
 from urllib.parse import SplitResult, urlsplit
@@ -17,6 +19,7 @@ from urllib.parse import SplitResult, urlsplit
 import cv2
 
 from polepilot.core.errors import CameraError
+from polepilot.core.vision.catching_up import CatchingUp, sleeps_of_thread
 from polepilot.core.vision.stream import VideoStream
 
 _PORTS = {"rtsp": 554, "rtsps": 322, "rtmp": 1935, "http": 80, "https": 443, "udp": 0, "tcp": 0}
@@ -24,12 +27,7 @@ _SCHEME = re.compile(r"^([a-z][a-z0-9+.-]*)://?", re.IGNORECASE)
 _OPEN_TIMEOUT = 5.0
 _READ_TIMEOUT = 2.0
 _PROBE_TIMEOUT = 2.0
-_AWAY = 1.0
-"""Seconds without a picture after which those that come next may have waited somewhere."""
-_WAITED = 0.005
-"""Seconds; a picture that took less to come had been waiting."""
-_CATCH_UP = 2.0
-"""Seconds after which a picture is taken as it is: decoding is slower than the camera."""
+"""Seconds for each step of finding out what is wrong: the name, the port, the answer."""
 
 
 def is_address(source: str) -> bool:
@@ -61,6 +59,8 @@ def without_password(source: str) -> str:
 def open_address(address: str) -> AddressStream:
     """Open a network stream.
 
+    It is given up after 13 s at the latest: 2 for the name, 5 to open, 6 to find out what is wrong.
+
     Raises:
         CameraError: there are no pictures from there, and as far as can be found out why.
     """
@@ -70,6 +70,9 @@ def open_address(address: str) -> AddressStream:
             f"{shown(address)} is no address of a camera: expected rtsp://, http:// or the like.",
             code="camera_address",
         )
+    if _name_hangs(address):
+        # FFmpeg's own limit does not hold while it looks up a name.
+        raise _explain(address)
     capture: Any = cv2.VideoCapture(
         address,
         cv2.CAP_FFMPEG,
@@ -98,27 +101,83 @@ class AddressStream(VideoStream):
 
     def __init__(self, capture: Any) -> None:
         super().__init__(capture)
-        self._last: float | None = None
+        self._catching_up = CatchingUp()
 
     def grab(self) -> bool:
-        begin, computed = time.monotonic(), time.thread_time()
-        behind = self._last is None
-        first = begin
+        self._catching_up.ask(time.monotonic())
         while True:
+            begin, computed, sleeps = time.monotonic(), time.thread_time(), sleeps_of_thread()
             if not super().grab():
                 return False
             end = time.monotonic()
             # Decoding happens in this thread; what is left of the time was spent waiting.
-            waited = (end - begin) - (time.thread_time() - computed)
-            away = self._last is not None and end - self._last > _AWAY
-            self._last = end
-            if away:
-                behind = True
-            elif waited >= _WAITED:
-                behind = False
-            if not behind or end - first > _CATCH_UP:
+            computed = time.thread_time() - computed
+            slept = sleeps_of_thread() > sleeps
+            if not self._catching_up.is_old(begin, end, computed=computed, slept=slept):
                 return True
-            begin, computed = end, time.thread_time()
+
+
+def _look_up(host: str, port: int) -> list[Any]:
+    """The places of ``host``, as of ``socket.getaddrinfo``, which has no time limit of its own.
+
+    Raises:
+        TimeoutError: no answer within ``_PROBE_TIMEOUT``.
+        OSError: as ``socket.getaddrinfo``.
+    """
+    answers: queue.SimpleQueue[list[Any] | OSError] = queue.SimpleQueue()
+
+    def ask() -> None:
+        try:
+            answers.put(socket.getaddrinfo(host, port, type=socket.SOCK_STREAM))
+        except OSError as error:
+            answers.put(error)
+        except UnicodeError:  # a label that is empty or too long
+            answers.put(socket.gaierror(socket.EAI_NONAME, "no name"))
+
+    threading.Thread(target=ask, name="name", daemon=True).start()
+    try:
+        answer = answers.get(timeout=_PROBE_TIMEOUT)
+    except queue.Empty:
+        raise TimeoutError("the name is not answered for") from None
+    if isinstance(answer, OSError):
+        raise answer
+    return answer
+
+
+def _name_hangs(address: str) -> bool:
+    """Whether nobody says where the camera is. FFmpeg's time limit stands still meanwhile."""
+    try:
+        parts = urlsplit(address)
+        host = parts.hostname
+    except ValueError:
+        return False
+    if not host or ("@" in address and "@" not in parts.netloc):
+        return False
+    try:
+        _look_up(host, 0)
+    except TimeoutError:
+        return True
+    except OSError:
+        pass  # FFmpeg will not find it either, and as soon
+    return False
+
+
+def _connect(host: str, port: int) -> socket.socket:
+    """A line to the first of the places of ``host`` that answers, within twice
+    ``_PROBE_TIMEOUT``."""
+    places = _look_up(host, port)
+    end = time.monotonic() + _PROBE_TIMEOUT
+    failure: OSError = TimeoutError("timed out")
+    for place in places:
+        left = end - time.monotonic()
+        if left <= 0:
+            break
+        try:
+            # By number: it is not looked up again.
+            return socket.create_connection(place[4][:2], left)
+        except OSError as error:
+            failure = error
+    raise failure
 
 
 def _explain(address: str) -> CameraError:
@@ -144,8 +203,7 @@ def _explain(address: str) -> CameraError:
             code="camera_address",
         )
     try:
-        with socket.create_connection((host, port), _PROBE_TIMEOUT) as line:
-            line.settimeout(_PROBE_TIMEOUT)
+        with _connect(host, port) as line:
             answer = _ask(line, parts)
     except socket.gaierror:
         return CameraError(
@@ -171,7 +229,8 @@ def _explain(address: str) -> CameraError:
 
 
 def _ask(line: socket.socket, parts: SplitResult) -> str:
-    """The first line of the answer to a request without a password; "" if there is none."""
+    """The first line of the answer to a request without a password, as far as it comes within
+    ``_PROBE_TIMEOUT``; "" if there is none."""
     scheme = parts.scheme.lower()
     if scheme not in ("http", "rtsp"):
         return ""
@@ -181,12 +240,22 @@ def _ask(line: socket.socket, parts: SplitResult) -> str:
         request = f"GET {parts.path or '/'}{query} HTTP/1.0\r\nHost: {host}\r\n\r\n"
     else:
         request = f"DESCRIBE rtsp://{host}{parts.path}{query} RTSP/1.0\r\nCSeq: 1\r\n\r\n"
+    end = time.monotonic() + _PROBE_TIMEOUT
+    answer = b""
     try:
+        line.settimeout(_PROBE_TIMEOUT)
         line.sendall(request.encode("utf-8"))
-        with line.makefile("rb") as answer:
-            return answer.readline(200).decode("latin-1").strip()
+        # The limit is for all of it: a camera may send a byte now and then.
+        while b"\n" not in answer and len(answer) < 200 and (left := end - time.monotonic()) > 0:
+            line.settimeout(left)
+            piece = line.recv(200)
+            if not piece:
+                break
+            answer += piece
     except OSError:
-        return ""
+        if not answer:
+            return ""
+    return answer[:200].partition(b"\n")[0].decode("latin-1").strip()
 
 
 def _explain_answer(failed: str, answer: str) -> CameraError:

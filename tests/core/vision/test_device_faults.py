@@ -19,6 +19,8 @@ from polepilot.core.vision import device_faults
 from polepilot.core.vision.device_faults import check_device, find_devices, users_of
 from polepilot.core.vision.sources import open_stream
 
+pytestmark = pytest.mark.timeout(60)
+
 CAMERA, OTHER_DATA = 0x04200001, 0x04A00000
 VIDEO = 44
 
@@ -164,7 +166,7 @@ def test_who_holds_a_device_is_named(tmp_path: Path) -> None:
         assert other.stdout is not None
         other.stdout.readline()
         users = users_of(path)
-        other.communicate()
+        other.communicate(timeout=30)
     assert len(users) == 1
     assert str(other.pid) in users[0]
     assert "python" in users[0]

@@ -18,7 +18,7 @@ from polepilot.core.landmark import LandmarkKind
 from polepilot.core.observation import Image
 from polepilot.core.vision.paint import ORANGE, Paint
 
-VERSION = 1
+VERSION = 2
 IDS = 256
 MOST_STRIPS = 40
 _LIBRARY = Path(__file__).with_name("_kernel.so")
@@ -68,6 +68,8 @@ class _Task(ctypes.Structure):
         ("high", ctypes.c_int32),
         ("low", ctypes.c_int32),
         ("weights", ctypes.c_int32 * 3),
+        ("least_other", ctypes.c_double),
+        ("most_other", ctypes.c_double),
         ("constant", ctypes.c_double),
         ("kinds", _Kind * IDS),
     ]
@@ -158,6 +160,7 @@ class Kernel:
         high, low = paint.channels
         task = _Task(high=high, low=-1 if low is None else low)
         task.weights[:] = paint.weights
+        task.least_other, task.most_other = paint.third
         task.constant = constant
         for number, kind in kinds.items():
             task.kinds[number] = _Kind(

@@ -8,6 +8,7 @@ proportions are a landmark, as they have to be for monochrome and infrared camer
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -48,6 +49,8 @@ _MOST_GREY = 0.3
 """A paint's darkest channel over its brightest, in linear light; orange has 0.05 in practice."""
 _LEAST_GREY = 0.8
 """From here on it counts as white."""
+_MOST_THIRD = 0.95
+"""The third channel's light over the brightest one's, where the paint has but one bright channel."""
 _ALIKE = 0.08
 """Channels nearer to each other than this share of the brightest are equally dark."""
 _DARK_ORDER = (1, 2, 0)
@@ -119,6 +122,19 @@ class Paint:
         dark = [channel for channel in _DARK_ORDER if channel != high]
         least = min(light) + _ALIKE * light[high]
         return high, next(channel for channel in dark if light[channel] <= least)
+
+    @property
+    def third(self) -> tuple[float, float]:
+        """Least and most light of the third channel, as shares of the brightest one's.
+
+        Light without white balance makes up to three times as much or as little of a share. Paints
+        with one bright channel, such as orange, are not held to a least.
+        """
+        high, low = self.channels
+        if low is None:
+            return 0.0, math.inf
+        share = self._light[3 - high - low] / self._light[high]
+        return (share / 4 if share > 0.4 else 0.0), max(_MOST_THIRD, 3 * share)
 
     @property
     def weights(self) -> Triple:

@@ -87,9 +87,19 @@ def test_a_grey_ladder_is_no_landmark_of_a_colour(name: str) -> None:
 
 def test_colours_are_told_apart() -> None:
     poles = [pole(13, 3.0, 0.0)]
-    for other, wanted in (("green", "orange"), ("orange", "green"), ("blue", "red")):
+    pairs = (("green", "orange"), ("orange", "green"), ("blue", "red"), ("orange", "magenta"))
+    for other, wanted in pairs:
         image = picture(poles, look=Look.painted(Paint.parse(other)))
         assert LandmarkDetector(CAMERA, ALL, Paint.parse(wanted)).detect(image) == []
+
+
+@pytest.mark.parametrize("colour", ["#ffff00", "#00ffff", "#ff00ff", "cyan"])
+@pytest.mark.parametrize("light", [(1.0, 1.0, 1.0), (0.6, 0.9, 1.2), (1.2, 1.0, 0.85)])
+def test_two_bright_channels(colour: str, light: tuple[float, float, float]) -> None:
+    paint = Paint.parse(colour)
+    look = Look(bright=Look.painted(paint).bright, light=light)
+    image = picture([pole(11, 4.5, 0.15)], seed=3, look=look)
+    check(LandmarkDetector(CAMERA, ALL, paint), image, 11, 4.5)
 
 
 def test_orange_is_what_it_was() -> None:

@@ -20,7 +20,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define EYE_VERSION 1
+#define EYE_VERSION 2
 #define EYE_MOST_BITS 8
 #define EYE_MOST_SEGMENTS (2 * EYE_MOST_BITS + 5)
 #define EYE_CODE_SIZE 24 /* bytes of a code as text, '1' for bright, with room for its end */
@@ -62,6 +62,8 @@ typedef struct {
 typedef struct {
     int32_t high, low; /* channels in which the bright paint is brightest and darkest; low -1: none */
     int32_t weights[3]; /* of blue, green, red in the brightness; none below 0, 256 together */
+    /* Light of the third channel, as a share of that of ``high``: the paint's hue in any light. */
+    double least_other, most_other;
     double constant;    /* camera constant, pixels */
     eye_kind kinds[EYE_IDS];
 } eye_task;

@@ -77,7 +77,8 @@ int eye_read(const eye_task *task, double levels[][3], int segments, int channel
         int other = 3 - task->high - task->low;
         /* Where the brightest channel has reached the end of its scale the next one catches up. */
         int full = high > FULL;
-        if (high - low < LEAST_COLOUR * high || (!full && mean[other] > 0.95 * high))
+        if (high - low < LEAST_COLOUR * high || mean[other] < task->least_other * high ||
+            (!full && mean[other] > task->most_other * high))
             return EYE_WRONG_COLOUR;
     }
     /* A thin strip is blurred: what is beside it lightens its black. */

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from polepilot.core.vehicle import Camera
     from polepilot.core.verdict import Verdict
     from polepilot.core.vision.calibration import ConstantFit
+    from polepilot.core.vision.paint import Paint
     from polepilot.server.settings import Settings
 
 _PASSES = 8
@@ -79,7 +80,7 @@ def calibrate_constant(
     from polepilot.core.vision.calibration import judge
 
     camera = starting_camera(settings, *pictures[0].size)
-    camera, fit = solve_constant(pictures, distances, kinds, only, camera)
+    camera, fit = solve_constant(pictures, distances, kinds, only, camera, settings.paint)
     if annotate is not None:
         _draw(pictures, fit, kinds, annotate)
     return _outcome(camera, fit, settings, judge(fit, camera.width))
@@ -105,6 +106,7 @@ def solve_constant(
     kinds: dict[int, LandmarkKind],
     only: int | None,
     camera: Camera,
+    paint: Paint,
 ) -> tuple[Camera, ConstantFit]:
     """Look, fit, and look again with what was found: the detector's view of pitch and lens
     depends a little on the constant.
@@ -116,7 +118,7 @@ def solve_constant(
     from polepilot.core.vision.detector import LandmarkDetector
 
     for _ in range(_PASSES):
-        detector = LandmarkDetector(camera, kinds)
+        detector = LandmarkDetector(camera, kinds, paint)
         found = _choose([(p.name, detector.detect(p.image)) for p in pictures], only, kinds)
         samples = [
             KnownRange(p.name, distance, seen, camera.constant, kinds[seen.id].axis_depth)

@@ -113,7 +113,7 @@ def from_dataset(
     readings = [s for s in recording.samples if isinstance(s, PanReading)]
     pan = _pan_at([(r.stamp, r.angle) for r in readings])
     kinds = {number: mark.kind for number, mark in landmarks.items()}
-    detector = LandmarkDetector(recording.camera, kinds)
+    detector = LandmarkDetector(recording.camera, kinds, recording.paint)
     found: list[RangeBearing] = []
     problem = ""
     frames = [s for s in recording.samples if isinstance(s, FrameFile) and start <= s.stamp <= end]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import math
 import shutil
 import struct
@@ -128,7 +129,11 @@ def test_a_picture_that_disagrees(at: Path, capsys: Captured) -> None:
     assert run([*words, "--distance", "6"]) == 0
     out = capsys.readouterr().out
     assert "left out" in out
-    assert "one picture disagrees: 4m.png by 6.9 % (29.7 cm too near)" in out
+    # 4 m of 4.3 m: 7 %, 30 cm.
+    said = re.search(r"one picture disagrees: 4m.png by ([\d.]+) % \(([\d.]+) cm too near\)", out)
+    assert said is not None
+    assert float(said[1]) == pytest.approx(7.0, abs=0.3)
+    assert float(said[2]) == pytest.approx(30.0, abs=1.3)
 
 
 def test_one_distance_only(at: Path, capsys: Captured) -> None:

@@ -153,8 +153,8 @@ class Kernel:
     ) -> None:
         if not (0 < constant < math.inf and all(0 < number < IDS for number in kinds)):
             raise InternalError(
-                f"a camera constant of {constant} and the ids {sorted(kinds)}: expected more than 0 "
-                f"pixels, and ids from 1 to {IDS - 1}."
+                f"a camera constant of {constant} and the ids {sorted(kinds)}: expected more than "
+                f"0 pixels, and ids from 1 to {IDS - 1}."
             )
         self._look = _library().eye_look
         high, low = paint.channels

@@ -50,7 +50,7 @@ _MOST_GREY = 0.3
 _LEAST_GREY = 0.8
 """From here on it counts as white."""
 _MOST_THIRD = 0.95
-"""The third channel's light over the brightest one's, where the paint has but one bright channel."""
+"""The third channel's light over the brightest one's, where a paint has one bright channel only."""
 _ALIKE = 0.08
 """Channels nearer to each other than this share of the brightest are equally dark."""
 _DARK_ORDER = (1, 2, 0)

@@ -31,8 +31,8 @@ typedef struct {
     float beside[EYE_MOST_ROWS][4];  /* every channel and brightness just beside the strip */
     double column, row, lean;        /* the strip's middle */
     int columns;                     /* of ``across``, */
-    int step;                        /* each so many of the picture apart */
-    double across_first;             /* column of entry 0 */
+    int step;                        /* each the mean of so many of the picture */
+    double across_first;             /* middle of entry 0 */
     float across[EYE_MOST_COLUMNS];  /* bright minus dark by column */
     double half_window;              /* half the columns that the profile averages */
 } eye_upright;

@@ -104,8 +104,9 @@ static int choose_columns(const eye_picture *p, const eye_upright *u, double hal
                           int *to)
 {
     double reach = half * 1.25 + MARGIN;
-    int first = (int)ceil((0.0 - u->across_first) / u->step);
-    int last = (int)floor((p->columns - 1 - u->across_first) / u->step) + 1;
+    double whole = (u->step - 1) / 2.0; /* columns on either side that an entry averages */
+    int first = (int)ceil((whole - u->across_first) / u->step);
+    int last = (int)floor((p->columns - 1 - whole - u->across_first) / u->step) + 1;
     *from = (int)ceil((u->column - reach - u->across_first) / u->step);
     *to = (int)floor((u->column + reach - u->across_first) / u->step) + 1;
     /* Beyond the picture there is nothing to compare with. */

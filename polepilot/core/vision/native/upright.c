@@ -14,7 +14,7 @@
 #define MOST_LEANS 12   /* that are tried to either side at first */
 #define ROUNDS 2        /* of parabolas after that */
 #define ROWS_A_BAND 3   /* more rows than this are left out */
-#define COLUMNS_ACROSS 7.0 /* more columns than this across the strip are left out */
+#define COLUMNS_ACROSS 7.0 /* more columns than this across the strip are averaged */
 #define LOOKED_AT 0.70  /* share of the half width over which the profile is averaged, */
 #define LEAST_LOOKED_AT 0.6 /* and columns at the least */
 #define COLUMNS_A_HALF 2.5 /* more columns than this in the half of that are left out */
@@ -40,7 +40,8 @@ static inline float light_of(const uint8_t *pixel, int channels, const eye_task 
     return eye_linear_sixteenths(eye_brightness(pixel, channels, task));
 }
 
-/* Light and signal of one band by column, between two rows: the mean of up to ROWS_A_BAND. */
+/* Light and signal of one band by column, between two rows: the mean of up to ROWS_A_BAND of them,
+ * and of ``step`` columns of the picture. */
 static void fill_band(const eye_picture *p, const eye_task *task, double from, double to,
                       int first, int step, int columns, band *out)
 {
@@ -57,16 +58,16 @@ static void fill_band(const eye_picture *p, const eye_task *task, double from, d
         int y = top + (2 * i + 1) * count / (2 * used);
         const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
         middle += y;
-        for (int c = 0; c < columns; c++) {
-            int x = eye_clamp(first + c * step, 0, p->columns - 1);
+        for (int k = 0; k < columns * step; k++) {
+            int x = eye_clamp(first + k, 0, p->columns - 1), c = k / step;
             const uint8_t *pixel = row + x * p->channels;
             out->light[c] += light_of(pixel, p->channels, task);
             out->signal[c] += (float)eye_signal(pixel, p->channels, task);
         }
     }
     for (int c = 0; c < columns; c++) {
-        out->light[c] /= (float)used;
-        out->signal[c] /= (float)used;
+        out->light[c] /= (float)(used * step);
+        out->signal[c] /= (float)(used * step);
     }
     out->row = middle / used;
 }
@@ -297,19 +298,20 @@ int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candida
     columns = columns > EYE_MOST_COLUMNS ? EYE_MOST_COLUMNS : columns;
     band bands[2 * EYE_MOST_BITS + 4];
     int n = fill_bands(p, task, c, code, segments, unit, first, step, columns, bands);
-    cap_signal(bands, n, columns, (int)lround((c->column - first) / step));
+    double across_first = first + (step - 1) / 2.0;
+    cap_signal(bands, n, columns, (int)lround((c->column - across_first) / step));
     double lean = find_lean(bands, n, columns, step, row, length, wide > 2 ? wide : 2);
     if (fabs(lean) > STEEPEST)
         return EYE_LEANS;
     difference(bands, n, columns, step, row, lean, 0, out->across);
     for (int i = 0; i < columns; i++)
-        if (first + i * step < 0 || first + i * step >= p->columns)
+        if (first + i * step < 0 || first + (i + 1) * step > p->columns)
             out->across[i] = 0; /* beyond the picture */
     out->row = row;
     out->lean = lean;
     out->columns = columns;
     out->step = step;
-    out->across_first = first;
+    out->across_first = across_first;
     if (!find_middle(out, wide, &out->column))
         return EYE_NO_CONTRAST;
     difference(bands, n, columns, step, row, lean, 1, out->across);

@@ -70,6 +70,14 @@ def case(seed: int, number: int) -> None:
     assert np.array_equal(image, before)
 
 
+def giant() -> None:
+    """A code of twelve million rows, of a landmark a thousand times as thick as it is long."""
+    code = np.frombuffer(encode(13).encode(), np.uint8) == ord("1")
+    column = np.repeat(np.pad(code, 2), 700_000)[:, None] * np.uint8(255)
+    kinds = {13: LandmarkKind(segment=0.002, diameter=10)}
+    check(Kernel(kinds, 600.0).look(column), kinds)
+
+
 def kinds_of(rng: Generator) -> dict[int, LandmarkKind]:
     """Landmarks of one number of bits, of several, or none; of any size that is allowed."""
     usual = rng.random() < 0.5
@@ -164,6 +172,7 @@ def numbers(text: str) -> Iterator[int]:
 
 if __name__ == "__main__":
     kernel._LIBRARY = Path(sys.argv[1])
+    giant()
     for number in numbers(sys.argv[3]):
         print(number, flush=True)
         case(int(sys.argv[2]), number)

@@ -26,12 +26,12 @@
 #define RIDGE 1e-9
 #define LEVEL_RIDGE 1e-4  /* rows of nothing: hold the levels that no row shows */
 
-/* The sums of one round of the fit. */
 /* Light along the strip in one channel, and just beside it, there from its mean. */
 typedef struct {
     double light[EYE_MOST_ROWS], beside[EYE_MOST_ROWS];
 } profile;
 
+/* The sums of one round of the fit. */
 typedef struct {
     double rests[EYE_MOST_ROWS]; /* what is left over, weighted as the rows are, */
     double variance;             /* of that */

@@ -7,12 +7,13 @@
 #define LEAST_ROWS 8           /* of a picture; no code has fewer */
 #define ATTEMPTS 2
 #define MOST_MISFIT 7.0        /* with one bright bit, */
-#define MISFIT_A_BIT 1.5       /* and more for every further one: the more there is to fit */
+#define MISFIT_A_BIT 3.0       /* and more for every further one: the more there is to fit */
 #define USUAL_NOISE 0.035      /* rms rest of the fit of the edges, of bright - dark */
-#define USUAL_SIDE_NOISE 0.06  /* rms rest of the fit across, of its peak */
+#define USUAL_SIDE_NOISE 0.08  /* rms rest of the fit across, of its peak */
 #define USUAL_PITCH 0.035      /* radians between camera and pole */
-#define USUAL_TINT 0.12        /* as in eye_strip */
-#define USUAL_SIGMA 0.0052      /* of the unit, as a share of it */
+#define USUAL_BEND 2.1          /* times what the sag's sigma and that pitch allow */
+#define USUAL_TINT 0.17        /* as in eye_strip */
+#define USUAL_SIGMA 0.0040      /* of the unit, as a share of it */
 #define SURE 4e-4              /* share of the unit: no second fit makes it better */
 #define FEW_ROWS 6.0           /* per segment: JPEG blurs colour by up to as much */
 #define MOST_BLUR 0.5          /* rows, and three tenths of a segment */
@@ -49,7 +50,7 @@ static double misfit(const eye_strip *strip, double constant)
     double sag = hypot(strip->sag_sigma, USUAL_PITCH * strip->unit / constant);
     double edges = strip->noise / USUAL_NOISE, sides = strip->side_noise / USUAL_SIDE_NOISE;
     double tint = strip->tint > 0 ? strip->tint / USUAL_TINT : 0;
-    double bend = strip->sag / (1.5 * sag);
+    double bend = strip->sag / (USUAL_BEND * sag);
     double vague = strip->unit_sigma / USUAL_SIGMA;
     return edges * edges + sides * sides + bend * bend + tint * tint + vague * vague;
 }

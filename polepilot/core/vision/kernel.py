@@ -20,7 +20,7 @@ from polepilot.core.vision.paint import ORANGE, Paint
 
 VERSION = 2
 IDS = 256
-MOST_STRIPS = 40
+MOST_STRIPS = 24
 _LIBRARY = Path(__file__).with_name("_kernel.so")
 _SHAPES = ((), (1,), (3,))
 """Channels of a picture: grey in two ways, and blue-green-red."""

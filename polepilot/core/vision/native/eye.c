@@ -14,7 +14,7 @@
 #define USUAL_BEND 2.1          /* times what the sag's sigma and that pitch allow */
 #define USUAL_TINT 0.17        /* as in eye_strip */
 #define USUAL_SIGMA 0.0040      /* of the unit, as a share of it */
-#define SURE 4e-4              /* share of the unit: no second fit makes it better */
+#define SURE 6e-4              /* share of the unit: no second fit makes it better */
 #define FEW_ROWS 6.0           /* per segment: JPEG blurs colour by up to as much */
 #define MOST_BLUR 0.5          /* rows, and three tenths of a segment */
 #define SHORTEST 1.25          /* rows per segment */

@@ -21,6 +21,7 @@
 #define LEAST_SIGNAL 4.0 /* grey levels of bright minus dark */
 #define ALL_ROWS 4.0    /* rows per segment up to which each is kept, */
 #define ROWS_A_UNIT 5.0 /* and how many are kept if there are many more */
+#define THIN 3.0        /* half of the columns looked at: nothing is blurred into the midst of more */
 #define BESIDE 2.0      /* columns from the strip's side to what is beside it */
 
 /* The rows of one run of the code, averaged. */
@@ -242,7 +243,10 @@ static void fill_profile(const eye_picture *p, const eye_task *task, double top,
             }
         }
         float scale = total > 1e-6f ? 1 / total : 0;
-        fill_beside(p, task, first + r * bin + bin / 2, out, out->beside[r]);
+        if (half < THIN)
+            fill_beside(p, task, first + r * bin + bin / 2, out, out->beside[r]);
+        else
+            memset(out->beside[r], 0, sizeof out->beside[r]);
         out->light[r] = light * scale;
         for (int k = 0; k < 3; k++)
             out->channel[r][k] = channel[k] * scale;

@@ -4,8 +4,10 @@
  * towards one end where the camera looks up or down. */
 #include "wave.h"
 
+#include <math.h>
 #include <string.h>
 
+#define LEAST_LEAK 0.01 /* share of what is beside the strip that is worth the work */
 #define SHOWS 5.0        /* times the blur: a boundary does not show farther away */
 #define MOST_SHIFT 1.2   /* half codes from the middle: light does not go on changing beyond */
 #define LEVEL_RIDGE 2e-3 /* rows of nothing: hold the levels that no row shows */
@@ -126,6 +128,8 @@ double eye_wave_row(const eye_wave *wave, eye_layout *at, const double *guess, d
 void eye_take_leak(eye_upright *u, double leak)
 {
     float mean[4] = {0}, share = (float)leak;
+    if (fabs(leak) < LEAST_LEAK)
+        return;
     for (int i = 0; i < u->rows; i++)
         for (int c = 0; c < 4; c++)
             mean[c] += u->beside[i][c] / (float)u->rows;

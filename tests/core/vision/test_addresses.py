@@ -14,9 +14,9 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from capture_waits import next_error, next_frame
 
 from polepilot.core.errors import CameraError
-from polepilot.core.observation import Frame
 from polepilot.core.vehicle import Camera
 from polepilot.core.vision import addresses
 from polepilot.core.vision.addresses import is_address, open_address, shown
@@ -142,30 +142,6 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(addresses, "_OPEN_TIMEOUT", 0.6)
     monkeypatch.setattr(addresses, "_READ_TIMEOUT", 0.6)
     monkeypatch.setattr(addresses, "_PROBE_TIMEOUT", 0.6)
-
-
-def next_frame(capture: CameraCapture, limit: float = 15.0) -> Frame:
-    """The next picture, whatever errors come before it."""
-    end = time.monotonic() + limit
-    while time.monotonic() < end:
-        with contextlib.suppress(CameraError):
-            frame = capture.read()
-            if frame is not None:
-                return frame
-        time.sleep(0.002)
-    pytest.fail("no picture came")
-
-
-def next_error(capture: CameraCapture, limit: float = 15.0) -> CameraError:
-    """The next error, whatever pictures come before it."""
-    end = time.monotonic() + limit
-    while time.monotonic() < end:
-        try:
-            capture.read()
-        except CameraError as error:
-            return error
-        time.sleep(0.002)
-    pytest.fail("no error came")
 
 
 def test_pictures_come_as_they_are_sent(server: Server, watch: Watch) -> None:

@@ -13,9 +13,10 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
+from capture_waits import next_error, next_frame
 
 from polepilot.core.errors import CameraError
-from polepilot.core.observation import Frame, Image
+from polepilot.core.observation import Image
 from polepilot.core.vehicle import Camera
 from polepilot.core.vision import capture as capture_module
 from polepilot.core.vision.capture import CameraCapture, describe_fit, fit
@@ -46,32 +47,6 @@ def start() -> Iterator[Start]:
 
 def gray(level: int, width: int = 160, height: int = 120) -> Image:
     return np.full((height, width, 3), level, np.uint8)
-
-
-def wait_for_frame(capture: CameraCapture, limit: float = 10.0) -> Frame:
-    """The next frame, whatever errors come before it."""
-    end = time.monotonic() + limit
-    while time.monotonic() < end:
-        try:
-            frame = capture.read()
-        except CameraError:
-            frame = None
-        if frame is not None:
-            return frame
-        time.sleep(0.002)
-    pytest.fail("no frame came")
-
-
-def wait_for_error(capture: CameraCapture, limit: float = 10.0) -> CameraError:
-    """The next error, whatever frames come before it."""
-    end = time.monotonic() + limit
-    while time.monotonic() < end:
-        try:
-            capture.read()
-        except CameraError as error:
-            return error
-        time.sleep(0.002)
-    pytest.fail("no error came")
 
 
 class FakeCamera:
@@ -197,13 +172,13 @@ def test_folder_of_pictures_in_order_of_names(tmp_path: Path, start: Start) -> N
 
     capture = start(str(tmp_path))
     capture._thread.join(20)
-    assert int(wait_for_frame(capture).image[0, 0, 0]) == 180
-    assert wait_for_error(capture).code == "camera_ended"
+    assert int(next_frame(capture).image[0, 0, 0]) == 180
+    assert next_error(capture).code == "camera_ended"
 
 
 def test_broken_picture_in_a_folder_is_named(tmp_path: Path, start: Start) -> None:
     (tmp_path / "0001.png").write_text("a text file")
-    error = wait_for_error(start(str(tmp_path)))
+    error = next_error(start(str(tmp_path)))
     assert "0001.png: is no picture" in str(error)
     assert error.code == "camera_file"
 
@@ -222,22 +197,22 @@ def test_file_that_is_no_video(
 ) -> None:  # fmt: skip
     if content is not None:
         (tmp_path / name).write_bytes(content)
-    assert expected in str(wait_for_error(start(str(tmp_path / name))))
+    assert expected in str(next_error(start(str(tmp_path / name))))
     assert capfd.readouterr().err == ""
 
 
 def test_pipe_is_no_video(tmp_path: Path, start: Start) -> None:
     os.mkfifo(tmp_path / "pipe.avi")
-    assert "pipe.avi is no file" in str(wait_for_error(start(str(tmp_path / "pipe.avi"))))
+    assert "pipe.avi is no file" in str(next_error(start(str(tmp_path / "pipe.avi"))))
 
 
 def test_pipe_in_a_folder_of_pictures_does_not_hang(tmp_path: Path, start: Start) -> None:
     os.mkfifo(tmp_path / "0001.png")
-    assert "0001.png: is a pipe" in str(wait_for_error(start(str(tmp_path))))
+    assert "0001.png: is a pipe" in str(next_error(start(str(tmp_path))))
 
 
 def test_empty_folder(tmp_path: Path, start: Start) -> None:
-    assert "holds no picture" in str(wait_for_error(start(str(tmp_path))))
+    assert "holds no picture" in str(next_error(start(str(tmp_path))))
 
 
 def test_only_the_newest_picture_is_delivered(start: Start) -> None:
@@ -245,7 +220,7 @@ def test_only_the_newest_picture_is_delivered(start: Start) -> None:
     seconds = itertools.count(100.0)  # slow enough that none is thinned out
     capture = start("fake", opener=fake.open, clock=lambda: next(seconds))
     fake.show(gray(50), gray(100), gray(150))
-    assert int(wait_for_frame(capture).image[0, 0, 0]) == 150
+    assert int(next_frame(capture).image[0, 0, 0]) == 150
 
 
 def test_faster_camera_is_thinned_to_the_rate(start: Start) -> None:
@@ -292,20 +267,20 @@ def test_camera_that_dies_and_comes_back(start: Start) -> None:
     fake = FakeCamera()
     capture = start("fake", opener=fake.open, backoff=(0.01, 0.02))
     fake.show(gray(10))
-    wait_for_frame(capture)
+    next_frame(capture)
 
     fake.unplug()
-    error = wait_for_error(capture)
+    error = next_error(capture)
     assert error.code in ("camera_gone", "camera_missing")
     while fake.opened < 4:
         time.sleep(0.005)
-    assert wait_for_error(capture).code == "camera_missing"
+    assert next_error(capture).code == "camera_missing"
 
     fake.plugged = True
     fake.show(gray(200))
-    frame = wait_for_frame(capture)
+    frame = next_frame(capture)
     while int(frame.image[0, 0, 0]) != 200:
-        frame = wait_for_frame(capture)
+        frame = next_frame(capture)
     capture.close()
     capture._thread.join(10)
     assert fake.released == 2
@@ -396,7 +371,7 @@ def test_another_shape_and_other_notes_are_told_once(start: Start) -> None:
 
     capture = start("fake", opener=Wide, notice=told.append)
     for _ in range(3):
-        wait_for_frame(capture)
+        next_frame(capture)
     assert told[0] == "the camera fake has no autofocus."
     assert "1280x720 pixels lose 25%" in told[1]
     assert len(told) == 2
@@ -412,7 +387,7 @@ def test_stamp_of_the_driver_counts(start: Start, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(capture_module, "time", SimpleNamespace(monotonic=lambda: 50.0))
     # The robot's clock starts anywhere.
     capture = start("fake", opener=Late, latency=0.04, clock=lambda: 1050.0)
-    assert wait_for_frame(capture).stamp == pytest.approx(1050.0 - 0.3 - 0.04)
+    assert next_frame(capture).stamp == pytest.approx(1050.0 - 0.3 - 0.04)
 
 
 @pytest.mark.parametrize("stamp", [1.0e9, -5.0, 1.0])
@@ -422,7 +397,7 @@ def test_stamp_of_another_clock_does_not_count(start: Start, stamp: float) -> No
             return stamp if stamp > 1 else time.monotonic() + stamp * 3
 
     before = time.monotonic()
-    frame = wait_for_frame(start("fake", opener=Odd, latency=0.04))
+    frame = next_frame(start("fake", opener=Odd, latency=0.04))
     assert before - 0.04 <= frame.stamp <= time.monotonic() - 0.04
 
 
@@ -436,14 +411,14 @@ def test_a_damaged_picture_is_passed_over_and_many_are_told(start: Start) -> Non
 
     capture = start("fake", Camera(width=80, height=60, rate=240.0), opener=Torn)
     for _ in range(3):
-        assert int(wait_for_frame(capture).image[0, 0, 0]) == 7
+        assert int(next_frame(capture).image[0, 0, 0]) == 7
 
     class Broken(Quiet):
         def retrieve(self) -> Image | None:
             return None
 
     capture = start("fake", Camera(width=80, height=60, rate=240.0), opener=Broken)
-    error = wait_for_error(capture)
+    error = next_error(capture)
     assert error.code == "camera_broken"
     assert "nothing but damaged pictures" in error.message
 
@@ -465,10 +440,10 @@ def test_a_fault_of_a_library_does_not_end_the_thread_nor_show_the_password(star
         return Quiet()
 
     capture = start("rtsp://robin:secret@cam/live", opener=opener, backoff=(0.01,))
-    error = wait_for_error(capture)
+    error = next_error(capture)
     said.set()
     assert str(error) == "the camera rtsp://...@cam/live failed (rtsp://...@cam/live failed)."
-    wait_for_frame(capture)
+    next_frame(capture)
 
 
 def test_messages_of_a_silent_address_do_not_show_the_password(start: Start) -> None:

@@ -20,9 +20,8 @@ COMPILER = shutil.which("cc") or shutil.which("gcc")
 SIZES = ((640, 480), (1280, 720), (1600, 1200))
 
 pytestmark = [
-    pytest.mark.skipif(
-        COMPILER is None or not sys.platform.startswith("linux"), reason="needs Linux and cc"
-    ),
+    # A machine without a compiler fails: `./run test` installs one.
+    pytest.mark.skipif(not sys.platform.startswith("linux"), reason="Video4Linux"),
     pytest.mark.timeout(60),
 ]
 

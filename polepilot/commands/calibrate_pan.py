@@ -153,8 +153,8 @@ def from_log(path: Path) -> tuple[list[RangeBearing], dict[int, Landmark], Stret
 
 def _read_log(path: Path) -> tuple[list[RangeBearing], dict[int, Landmark], Stretch]:
     from polepilot.core.observation import RangeBearing
+    from polepilot.core.robot.log import read_messages
     from polepilot.core.site import parse_site
-    from polepilot.server.runs import read_messages
 
     driven: list[tuple[float, float]] = []
     readings: list[tuple[float, float]] = []
@@ -169,7 +169,9 @@ def _read_log(path: Path) -> tuple[list[RangeBearing], dict[int, Landmark], Stre
             if message["pan"] is not None:
                 readings.append((message["t"], message["pan"]))
         elif channel == "sighting":
-            sightings.append(json.loads(data))
+            message = json.loads(data)
+            if message["measurements"]:
+                sightings.append(message)
     if not driven or not sightings:
         raise InputError(f"--log {path}: holds no sightings of a run; expected run.mcap.")
     start, end = _longest_stand(driven, (driven[0][0], driven[-1][0]), f"--log {path}")

@@ -15,13 +15,14 @@ from starlette.concurrency import run_in_threadpool
 
 from polepilot.core.errors import PlanError, PolepilotError, RefusedError, SiteError
 from polepilot.core.geometry import wrap_angle
+from polepilot.core.robot.log import finish_log
 from polepilot.core.robot.recorder import Recorder
 from polepilot.core.sim.world import start_of
 from polepilot.core.site import Site, parse_site
 from polepilot.server.convert import Job, coordinates_of, plan_of
 from polepilot.server.planner import Planner
 from polepilot.server.runner import RobotPort, Runner, Twin
-from polepilot.server.runs import finish_log, missed_area, travelled
+from polepilot.server.runs import missed_area, travelled
 from polepilot.server.schemas import PlanRequest
 from polepilot.server.store import Once, PlanRow, RunRow, SiteRow, Store
 

@@ -1,45 +1,22 @@
-"""Reading a run's MCAP file, also one that was cut off by a power cut."""
+"""What a screen and the store ask of a run's log (`core/robot/log.py` reads the file)."""
 
 from __future__ import annotations
 
 import json
-import os
-import struct
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mcap.exceptions import McapError
-from mcap.records import Channel, Message
-from mcap.stream_reader import StreamReader
-from mcap.writer import CompressionType, Writer
 from shapely import MultiPolygon
 
 from polepilot.core.plan import Plan
+from polepilot.core.robot.log import read_messages
 
 MOST_MOMENTS = 5000
 """More positions than this are not sent to a screen."""
 MOST_EVENTS = 5000
 _JUMP = 0.5
 """A pose that moves farther than this between two ticks was corrected, not driven; metres."""
-
-
-def read_messages(path: Path) -> Iterator[tuple[str, int, bytes]]:
-    """Channel, log time (nanoseconds) and data of all messages that reached the disk, in order."""
-    if not path.is_file():
-        return
-    channels: dict[int, str] = {}
-    with path.open("rb") as file:
-        try:
-            for record in StreamReader(file).records:
-                if isinstance(record, Channel):
-                    channels[record.id] = record.topic
-                elif isinstance(record, Message):
-                    yield channels[record.channel_id], record.log_time, record.data
-        except (McapError, struct.error, KeyError, ValueError):
-            # The end of a file that was never finished: what came before it is good.
-            return
 
 
 def read_track(path: Path) -> dict[str, Any]:
@@ -103,30 +80,3 @@ def travelled(path: Path) -> tuple[float, float]:
         return 0.0, 0.0
     steps = np.hypot(*np.diff(places, axis=0).T)
     return float(steps[steps < _JUMP].sum()), float(track["t"][-1] - track["t"][0])
-
-
-def finish_log(path: Path) -> bool:
-    """Give a log that was cut off its end, so that every MCAP reader opens it.
-
-    Returns whether there was anything to keep. The file is replaced in one step.
-    """
-    whole = path.with_suffix(".mcap.part")
-    count = 0
-    with whole.open("wb") as file:
-        writer = Writer(file, compression=CompressionType.ZSTD)
-        writer.start(profile="", library="polepilot")
-        channels: dict[str, int] = {}
-        for channel, stamp, data in read_messages(path):
-            if channel not in channels:
-                schema = writer.register_schema(channel, "jsonschema", b'{"type":"object"}')
-                channels[channel] = writer.register_channel(channel, "json", schema)
-            writer.add_message(channels[channel], stamp, data, stamp)
-            count += 1
-        writer.finish()  # type: ignore[no-untyped-call]
-        file.flush()
-        os.fsync(file.fileno())
-    if count:
-        whole.replace(path)
-    else:
-        whole.unlink()
-    return count > 0

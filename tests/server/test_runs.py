@@ -14,18 +14,12 @@ from server.fakes import FakeRobot, TestClient, fake_services, plan_document
 from shapely import MultiPolygon, box
 
 from polepilot.core.geometry import Pose2D
+from polepilot.core.robot.log import finish_log, read_messages
 from polepilot.core.robot.recorder import Recorder
 from polepilot.core.site import Site
 from polepilot.server.app import create_app
 from polepilot.server.convert import coordinates_of, multipolygon_of, plan_of
-from polepilot.server.runs import (
-    MOST_MOMENTS,
-    finish_log,
-    missed_area,
-    read_messages,
-    read_track,
-    travelled,
-)
+from polepilot.server.runs import MOST_MOMENTS, missed_area, read_track, travelled
 from polepilot.server.store import PlanRow
 
 PLAN = plan_of(PlanRow(1, 1, 1, "scan", None, None, 0.0, plan_document("scan")))

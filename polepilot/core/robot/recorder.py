@@ -1,18 +1,22 @@
 """The log of one run: an MCAP file with JSON messages, written while the robot drives.
 
-Channels: ``site`` and ``plan`` once at the start, ``snapshot`` every tick (each computed position),
-``sighting`` per picture, ``picture`` (JPEG) once a second, ``event`` when something happens,
-``result`` at the end. A reader that streams the file gets everything up to a power cut.
+Channels: ``robot``, ``site`` and ``plan`` once at the start, ``odometry`` per telemetry and
+``sighting`` per picture (what the localizer was given, from some seconds before the start on),
+``snapshot`` every tick (each computed position), ``picture`` (JPEG) once a second, ``event`` when
+something happens, ``result`` at the end. A reader that streams the file gets everything up to a
+power cut; `run_log` makes a recording of it that can be replayed.
 """
 
 from __future__ import annotations
 
 import base64
 import json
+import math
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -21,10 +25,12 @@ import cv2
 from mcap.writer import CompressionType, Writer
 
 from polepilot.core.geometry import Pose2D
-from polepilot.core.observation import Frame, RangeBearing
+from polepilot.core.localization.localizer import LocalizerSettings
+from polepilot.core.observation import Frame, Odometry, RangeBearing
 from polepilot.core.plan import Plan
 from polepilot.core.robot.snapshot import Event, Snapshot
 from polepilot.core.site import Site
+from polepilot.core.vehicle import RobotModel
 
 CHUNK_BYTES = 32 * 1024
 """Small, so that little is lost with the last one."""
@@ -71,8 +77,19 @@ class Recorder:
         self._thread = threading.Thread(target=self._write_all, name="recorder", daemon=True)
         self._thread.start()
 
-    def begin(self, stamp: float, site: Site, plan: Plan) -> None:
-        """What the run is about."""
+    def begin(
+        self,
+        stamp: float,
+        site: Site,
+        plan: Plan,
+        model: RobotModel | None = None,
+        localizer: LocalizerSettings | None = None,
+    ) -> None:
+        """What the run is about: map, plan, and the robot with what its localizer tolerates."""
+        if model is not None:
+            document = {name: asdict(getattr(model, name)) for name in ("vehicle", "camera", "pan")}
+            document["localizer"] = asdict(localizer or LocalizerSettings())
+            self._put("robot", stamp, document)
         self._put("site", stamp, site.to_json())
         self._put("plan", stamp, {"mode": plan.mode, **plan.to_json()})
 
@@ -107,32 +124,36 @@ class Recorder:
             },
         )
 
-    def sighting(self, stamp: float, measurements: list[RangeBearing], frame: Frame | None) -> None:
-        """What one picture gave, and now and then the picture itself."""
-        if measurements:
-            self._put(
-                "sighting",
-                stamp,
-                {
-                    "t": _round(stamp),
-                    "measurements": [
-                        {
-                            "landmark": m.landmark,
-                            "range": _round(m.range),
-                            "bearing": _round(m.bearing),
-                            "range_sigma": float(f"{m.range_sigma:.3g}"),
-                            "bearing_sigma": float(f"{m.bearing_sigma:.3g}"),
-                        }
-                        for m in measurements
-                    ],
-                },
-            )
-        if frame is not None and stamp >= self._next_picture:
-            self._next_picture = stamp + PICTURE_PERIOD
-            done, jpeg = cv2.imencode(".jpg", frame.image, [cv2.IMWRITE_JPEG_QUALITY, 80])
-            if done:
-                data = base64.b64encode(jpeg.tobytes()).decode("ascii")
-                self._put("picture", stamp, {"t": _round(stamp), "format": "jpeg", "data": data})
+    def odometry(self, odometry: Odometry, pan: float | None) -> None:
+        """How the robot moves from ``odometry.stamp`` on, as the localizer was told; the pan angle
+        of that moment where it is known."""
+        document = {
+            "t": _fine(odometry.stamp),
+            "speed": _fine(odometry.speed),
+            "steering": _fine(odometry.steering),
+            "pan": None if pan is None else _fine(pan),
+        }
+        self._put("odometry", odometry.stamp, document)
+
+    def sighting(
+        self, stamp: float, measurements: Sequence[RangeBearing], frame: Frame | None
+    ) -> None:
+        """What one picture gave, nothing included, and now and then the picture itself."""
+        document = {"t": _fine(stamp), "measurements": [_measured(m) for m in measurements]}
+        self._put("sighting", stamp, document)
+        if frame is not None:
+            self.picture(frame)
+
+    def picture(self, frame: Frame) -> None:
+        """A picture, unless one was kept a moment ago."""
+        if frame.stamp < self._next_picture:
+            return
+        self._next_picture = frame.stamp + PICTURE_PERIOD
+        done, jpeg = cv2.imencode(".jpg", frame.image, [cv2.IMWRITE_JPEG_QUALITY, 80])
+        if done:
+            data = base64.b64encode(jpeg.tobytes()).decode("ascii")
+            document = {"t": _round(frame.stamp), "format": "jpeg", "data": data}
+            self._put("picture", frame.stamp, document)
 
     def event(self, event: Event) -> None:
         """Something that happened."""
@@ -186,6 +207,24 @@ class Recorder:
 
 
 _UPPER = ([0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2])
+
+
+def _measured(measurement: RangeBearing) -> dict[str, Any]:
+    """JSON has no infinity: a range that is not known is null."""
+    ranged = math.isfinite(measurement.range) and math.isfinite(measurement.range_sigma)
+    return {
+        "landmark": measurement.landmark,
+        "range": _fine(measurement.range) if ranged else None,
+        "bearing": _fine(measurement.bearing),
+        "range_sigma": float(f"{measurement.range_sigma:.4g}") if ranged else None,
+        "bearing_sigma": float(f"{measurement.bearing_sigma:.4g}"),
+        "pan": None if measurement.pan is None else _fine(measurement.pan),
+    }
+
+
+def _fine(value: float) -> float:
+    """What a replay begins from is kept to a millionth."""
+    return round(float(value), 6)
 
 
 def _round(value: float) -> float:

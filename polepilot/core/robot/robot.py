@@ -20,15 +20,10 @@ from polepilot.core.link.calibration import DriveCalibration
 from polepilot.core.link.messages import Faults, Features
 from polepilot.core.link.protocol import LinkState, TelemetrySample
 from polepilot.core.localization.localizer import Localizer, LocalizerSettings
-from polepilot.core.observation import (
-    Odometry,
-    PanReading,
-    PoseEstimate,
-    RangeBearing,
-    Status,
-)
+from polepilot.core.observation import Odometry, PanReading, PoseEstimate, RangeBearing, Status
 from polepilot.core.plan import Plan
 from polepilot.core.robot.gaze import Gaze
+from polepilot.core.robot.inputs import Inputs
 from polepilot.core.robot.journal import Journal
 from polepilot.core.robot.line import Line
 from polepilot.core.robot.mission import Mission, Outcome, RunSummary
@@ -96,6 +91,7 @@ class Robot:
         self._supervisor = Supervisor(settings.limits, settings.model.vehicle)
         pan = settings.model.pan
         self._pan = PanTrack()
+        self._inputs = Inputs()
         self._servo = Servo(settings.model.vehicle.steering_rate)
         self._sweep = PanSweep(pan.minimum, pan.maximum, pan.sweep_duty)
 
@@ -164,6 +160,7 @@ class Robot:
         self._estimate = None
         self._was_fixed = False
         self._waiting.clear()
+        self._inputs.clear()
         self._looks_from = self._now
         self._say("site_loaded", "info", f"Map {site.name!r} loaded; looking for landmarks.")
 
@@ -178,7 +175,8 @@ class Robot:
             plan, self._site, self._mission is not None, self._host, self._estimate
         )
         mission = Mission(run_id, plan, site, self.settings.model, recorder, self._now)
-        recorder.begin(self._now, site, plan)
+        recorder.begin(self._now, site, plan, self.settings.model, self.settings.localizer)
+        self._inputs.record(recorder)
         self._arm()
         self._mission = mission
         self._journal.on_event = recorder.event
@@ -303,18 +301,14 @@ class Robot:
     def _take_telemetry(self, sample: TelemetrySample) -> None:
         previous = None if self._telemetry is None else self._telemetry.telemetry
         self._telemetry = sample
-        telemetry = sample.telemetry
+        telemetry, angle = sample.telemetry, None
         if self._host.features & Features.PAN:
             angle = self.settings.model.pan.angle(telemetry.pan_adc)
             self._pan.add(PanReading(sample.stamp, angle))
         odometry = self.settings.calibration.to_odometry(
             telemetry, sample.stamp, previous, self._host.features
         )
-        odometry = self._odometry = self._servo.follow(odometry)
-        if odometry.speed != 0.0:
-            self._watch.moved(sample.stamp)
-        if self._localizer is not None:
-            self._localizer.add_odometry(odometry)
+        self._move(self._servo.follow(odometry), angle)
         self._journal.board_faults(self._now, telemetry.faults)
 
     def _notice_silence(self, now: float) -> None:
@@ -323,9 +317,15 @@ class Robot:
         if self._odometry.speed == 0.0 or age is None or age < SILENT_AFTER:
             return
         stamp = self._odometry.stamp + SILENT_AFTER
-        self._odometry = replace(self._odometry, stamp=stamp, speed=0.0)
+        self._move(replace(self._odometry, stamp=stamp, speed=0.0))
+
+    def _move(self, odometry: Odometry, pan: float | None = None) -> None:
+        self._odometry = odometry
+        if odometry.speed != 0.0:
+            self._watch.moved(odometry.stamp)
         if self._localizer is not None:
-            self._localizer.add_odometry(self._odometry)
+            self._localizer.add_odometry(odometry)
+            self._inputs.add_odometry(odometry, pan)
 
     def _locate(self, now: float) -> None:
         """The pose from everything sensed until now."""
@@ -353,8 +353,7 @@ class Robot:
             to_range_bearing(detection, sighting.stamp, angle) for detection in sighting.detections
         ]
         localizer.add_measurements(measurements)
-        if self._mission is not None:
-            self._mission.recorder.sighting(sighting.stamp, measurements, sighting.frame)
+        self._inputs.add_sighting(sighting.stamp, measurements, sighting.frame)
 
     def _decide(self, now: float, dt: float) -> DriveCommand:
         """What the mission wants; standing still wherever that is in doubt."""
@@ -487,6 +486,7 @@ class Robot:
         mission.recorder.result(self._now, summary.to_json())
         mission.recorder.close(wait=wait)
         self._journal.on_event = lambda _: None
+        self._inputs.end()
         self._mission = None
         self._paused = None
         if self.on_run_ended is not None:

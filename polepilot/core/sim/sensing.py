@@ -7,25 +7,21 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from polepilot.core.detector_model import (
+    BEARING_SIGMA,
+    BORDER,
+    DROP_OUT,
+    NEAREST,
+    SIGHT_MARGIN,
+    farthest,
+    range_sigma,
+    scale_of,
+)
 from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.landmark import Landmark
 from polepilot.core.observation import Detection
 from polepilot.core.scenery import Scenery
 from polepilot.core.vehicle import Camera
-
-FARTHEST = 16.0
-"""The detector reads a 65 cm landmark no farther away than this, metres; others in proportion."""
-RANGE_SHARE = 0.003
-"""Range error that does not depend on the distance, as a share of the range."""
-EDGE_PIXELS = 0.2
-"""Error of the code's length in the picture, pixels."""
-BEARING_SIGMA = math.radians(0.05)
-DROP_OUT = 0.03
-"""Share of the whole landmarks in view that are not read."""
-SIGHT_MARGIN = 0.10
-"""The line of sight ends this far short of a pole's axis: poles standing at a wall are seen."""
-_BORDER = 2.0
-_REFERENCE_HEIGHT = 0.65
 
 
 def sightings(
@@ -49,7 +45,7 @@ def sightings(
     for mark in sorted(landmarks, key=lambda mark: pose.distance_to(mark.position)):
         away = pose.distance_to(mark.position)
         bearing = pose.bearing_to(mark.position)
-        if away < 0.2 or abs(bearing) > camera.half_view + 0.05:
+        if away < NEAREST or abs(bearing) > camera.half_view + 0.05:
             continue
         covered = any(abs(bearing - middle) < half for middle, half in shadows)
         shadows.append((bearing, math.atan2(mark.kind.diameter / 2, away)))
@@ -73,25 +69,24 @@ def _measure(
     camera: Camera, mark: Landmark, away: float, bearing: float, rng: np.random.Generator
 ) -> Detection | None:
     """The detection of one landmark in the open, or None where its code is not in the picture."""
-    depth = (away - mark.kind.axis_depth) * math.cos(bearing)
-    scale = camera.constant / depth
+    scale = scale_of(camera, mark.kind, away, math.cos(bearing))
     height = mark.kind.height
     column = camera.center_x - camera.constant * math.tan(bearing)
     top = camera.center_y - scale * (height - camera.mount_height)
     bottom = camera.center_y + scale * camera.mount_height
     inside = (
-        _BORDER <= column <= camera.width - 1 - _BORDER
-        and top >= _BORDER
-        and bottom <= camera.height - 1 - _BORDER
+        BORDER <= column <= camera.width - 1 - BORDER
+        and top >= BORDER
+        and bottom <= camera.height - 1 - BORDER
     )
-    if not inside or away > FARTHEST * height / _REFERENCE_HEIGHT:
+    if not inside or away > farthest(mark.kind):
         return None
-    range_sigma = away * math.hypot(RANGE_SHARE, EDGE_PIXELS / (scale * height))
+    sigma = range_sigma(camera, mark.kind, away, math.cos(bearing))
     range_error, bearing_error = rng.standard_normal(2)
-    measured = away + range_sigma * float(range_error)
+    measured = away + sigma * float(range_error)
     direction = bearing + BEARING_SIGMA * float(bearing_error)
     # The picture that goes with the measured values, so that the two do not contradict.
-    scale = camera.constant / ((measured - mark.kind.axis_depth) * math.cos(direction))
+    scale = scale_of(camera, mark.kind, measured, math.cos(direction))
     return Detection(
         id=mark.id,
         range=measured,
@@ -99,6 +94,6 @@ def _measure(
         column=camera.center_x - camera.constant * math.tan(direction),
         top=camera.center_y - scale * (height - camera.mount_height),
         bottom=camera.center_y + scale * camera.mount_height,
-        range_sigma=range_sigma,
+        range_sigma=sigma,
         bearing_sigma=BEARING_SIGMA,
     )

@@ -10,39 +10,58 @@ import typer
 
 def replay(
     dataset: Annotated[
-        Path, typer.Argument(help="Folder with dataset.json, samples.jsonl and pictures.")
+        Path,
+        typer.Argument(
+            metavar="RECORDING",
+            help="Folder with dataset.json, samples.jsonl and pictures; or the log of a run "
+            "(run.mcap), or its folder.",
+        ),
     ],
     out: Annotated[Path, typer.Option("--out", help="Folder for the trajectories.")],
     method: Annotated[
-        str, typer.Option("--method", help="ekf, or the paper's method: paper.")
-    ] = "ekf",
+        str | None,
+        typer.Option(
+            "--method", help="ekf, or the paper's method: paper. A log: what the run used."
+        ),
+    ] = None,
     smooth: Annotated[
         bool, typer.Option("--smooth", help="Also write smoothed.tum, the offline best.")
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
 ) -> None:
-    """Run the localizer over a recorded run and write where the robot was."""
+    """Run the localizer over a recorded run and write where the robot was.
+
+    A log that was cut off is replayed as far as it goes, and that is said.
+    """
     import json as json_module
     import math
+    import sys
+    from dataclasses import replace
 
     import numpy as np
     from rich.console import Console
     from rich.progress import Progress
 
     from polepilot.core.errors import DatasetError, ImageError, InputError
-    from polepilot.core.localization.localizer import LocalizerSettings
     from polepilot.core.observation import Detection
     from polepilot.core.robot.dataset import FrameFile, read_dataset
     from polepilot.core.robot.replay import replay as run
     from polepilot.core.robot.replay import smooth as smoothed_poses
     from polepilot.core.robot.replay import write_results
+    from polepilot.core.robot.run_log import find_log, read_run_log
     from polepilot.core.trajectory import Trajectory, heading_errors, position_errors
     from polepilot.core.vision.detector import LandmarkDetector
     from polepilot.core.vision.images import read_image
 
-    if method not in ("ekf", "paper"):
+    if method not in (None, "ekf", "paper"):
         raise InputError(f"--method is {method!r}: expected 'ekf' or 'paper'.")
-    recording = read_dataset(dataset)
+    log = None if (dataset / "dataset.json").exists() else find_log(dataset)
+    recording = read_dataset(dataset) if log is None else read_run_log(log)
+    for note in recording.notes:
+        sys.stderr.write(note + "\n")
+    settings = recording.settings
+    if method is not None:
+        settings = replace(settings, method="paper" if method == "paper" else "ekf")
     camera = recording.camera
     detector = LandmarkDetector(
         camera,
@@ -71,7 +90,7 @@ def replay(
         result = run(
             recording,
             see,
-            LocalizerSettings(method="paper" if method == "paper" else "ekf"),
+            settings,
             lambda done: bars.update(task, completed=done),
         )
     if len(unusable) == result.frames:
@@ -79,7 +98,7 @@ def replay(
         raise DatasetError(f"{dataset}: none of its pictures can be used; {unusable[0]}")
     write_results(result, out, smoothed_poses(recording, result) if smooth else None)
     if json:
-        typer.echo(json_module.dumps(result.to_json()))
+        typer.echo(json_module.dumps({**result.to_json(), "notes": recording.notes}))
         return
     typer.echo(f"{len(result.estimates)} poses from {result.frames} pictures -> {out}")
     for event in result.events:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import combinations
 from pathlib import Path
-from typing import Any
 
 from polepilot.core.errors import DatasetError, InputError
-from polepilot.core.landmark import Landmark, LandmarkKind
-from polepilot.core.observation import Odometry, PanReading
+from polepilot.core.landmark import Landmark
+from polepilot.core.localization.localizer import LocalizerSettings
+from polepilot.core.observation import Odometry, PanReading, RangeBearing
+from polepilot.core.robot.fields import Fields, parse_json, shown
 from polepilot.core.trajectory import Trajectory, read_tum
 from polepilot.core.vehicle import Camera, Vehicle
 from polepilot.core.vision.paint import ORANGE, Paint
@@ -26,12 +27,22 @@ class FrameFile:
     """Of `samples.jsonl`."""
 
 
-Sample = Odometry | PanReading | FrameFile
+@dataclass(frozen=True, slots=True)
+class Sighted:
+    """What a picture gave, where a recording keeps that instead of the picture."""
 
-_LARGEST = 1e12
-"""No time, length or angle of a recording is larger."""
-_MOST = 1_000_000
-"""No count is larger: columns, rows, bits, ids."""
+    stamp: float
+    measurements: tuple[RangeBearing, ...]
+
+
+Sample = Odometry | PanReading | FrameFile | Sighted
+
+_FASTEST = 100.0
+"""No robot on poles drives faster, m/s."""
+_APART = 0.001
+"""Nearer to each other than this no two landmarks can stand, metres."""
+_BEYOND = math.radians(20)
+"""So far a potentiometer may say that it is beyond its ends, radians."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,6 +50,7 @@ class Dataset:
     """A recording, checked. Samples are in order of time; of one moment, the picture is last."""
 
     folder: Path
+    """Where it lies; of a run's log, the log."""
     camera: Camera
     vehicle: Vehicle
     pan_minimum: float
@@ -48,10 +60,20 @@ class Dataset:
     truth: Trajectory | None = None
     paint: Paint = ORANGE
     """Of the landmarks' bright segments; the optional field ``landmark.bright``."""
+    settings: LocalizerSettings = field(default_factory=LocalizerSettings)
+    """What its localizer tolerated; the program's own values where that was not recorded."""
+    notes: tuple[str, ...] = ()
+    """What is missing, as sentences."""
 
     @property
     def frames(self) -> int:
-        return sum(isinstance(sample, FrameFile) for sample in self.samples)
+        return sum(isinstance(sample, FrameFile | Sighted) for sample in self.samples)
+
+
+def in_order(samples: list[Sample]) -> tuple[Sample, ...]:
+    """By time; a picture is read with all that was known at its moment."""
+    samples.sort(key=lambda sample: (sample.stamp, isinstance(sample, FrameFile | Sighted)))
+    return tuple(samples)
 
 
 def read_dataset(folder: Path) -> Dataset:
@@ -63,7 +85,7 @@ def read_dataset(folder: Path) -> Dataset:
     if not folder.is_dir():
         raise DatasetError(f"{folder}: expected a folder with dataset.json and samples.jsonl.")
     path = folder / "dataset.json"
-    root = _Fields(path, "", _parse(_read_text(path), path))
+    root = Fields(path, "", parse_json(_read_text(path), path))
     camera, pan = root.child("camera"), root.child("camera")
     minimum, maximum = pan.number("pan_min_rad"), pan.number("pan_max_rad")
     if not minimum < maximum:
@@ -87,100 +109,22 @@ def read_dataset(folder: Path) -> Dataset:
         pan_minimum=minimum,
         pan_maximum=maximum,
         landmarks=_landmarks(root),
-        samples=_samples(folder),
+        samples=_samples(folder, (minimum - _BEYOND, maximum + _BEYOND)),
         truth=read_tum(truth) if truth.exists() else None,
         paint=root.child("landmark").paint(),
     )
 
 
-class _Fields:
-    """An object of a JSON document that knows where it stands."""
-
-    def __init__(self, path: Path, place: str, document: Any) -> None:
-        self._where = f"{path}: {place or 'the document'}"
-        self._path, self._place = path, place
-        if not isinstance(document, dict):
-            raise DatasetError(f"{self._where}: expected an object with named fields.")
-        self._document = document
-
-    def __contains__(self, key: str) -> bool:
-        return key in self._document
-
-    def value(self, key: str) -> Any:
-        if key not in self._document:
-            raise DatasetError(f"{self._where}: the field {key!r} is missing.")
-        return self._document[key]
-
-    def child(self, key: str) -> _Fields:
-        place = f"{self._place}.{key}" if self._place else key
-        return _Fields(self._path, place, self.value(key))
-
-    def number(self, key: str, above: float | None = None) -> float:
-        value = self.value(key)
-        good = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not good or not -_LARGEST <= value <= _LARGEST or (above is not None and value <= above):
-            limit = "" if above is None else f" above {above:g}"
-            raise DatasetError(
-                f"{self._where}: {key} is {_shown(value)}: expected a finite number{limit}."
-            )
-        return float(value)
-
-    def count(self, key: str) -> int:
-        value = self.value(key)
-        if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= _MOST:
-            raise DatasetError(
-                f"{self._where}: {key} is {_shown(value)}: expected a whole number, 1 to {_MOST}."
-            )
-        return value
-
-    def text(self, key: str) -> str:
-        value = self.value(key)
-        if not isinstance(value, str) or not value:
-            raise DatasetError(f"{self._where}: {key} is {_shown(value)}: expected a text.")
-        return value
-
-    def kind(self, default: LandmarkKind | None = None) -> LandmarkKind:
-        """The size of a landmark: bits, segment_m, diameter_m, and shape where it is not round."""
-        try:
-            if default is None:
-                return LandmarkKind(
-                    bits=self.count("bits"),
-                    segment=self.number("segment_m", above=0),
-                    diameter=self.number("diameter_m", above=0),
-                    shape=self.value("shape") if "shape" in self else "cylinder",
-                )
-            return LandmarkKind(
-                bits=self.count("bits") if "bits" in self else default.bits,
-                segment=self.number("segment_m") if "segment_m" in self else default.segment,
-                diameter=self.number("diameter_m") if "diameter_m" in self else default.diameter,
-                shape=self.value("shape") if "shape" in self else default.shape,
-            )
-        except DatasetError:
-            raise
-        except InputError as error:
-            raise DatasetError(f"{self._where}: {error.message}") from error
-
-    def paint(self) -> Paint:
-        """``bright``, of the landmarks' bright segments; orange where it is not said."""
-        if "bright" not in self:
-            return ORANGE
-        text = self.text("bright")
-        try:
-            return Paint.parse(text)
-        except InputError as error:
-            raise DatasetError(f"{self._where}: {error.message}") from error
-
-
-def _landmarks(root: _Fields) -> dict[int, Landmark]:
+def _landmarks(root: Fields) -> dict[int, Landmark]:
     default = root.child("landmark").kind()
     entries = root.value("landmarks")
-    path = root._path
+    path = root.path
     if not isinstance(entries, list):
         raise DatasetError(f"{path}: landmarks: expected a list.")
     marks: dict[int, Landmark] = {}
     for index, entry in enumerate(entries):
         place = f"landmarks[{index}]"
-        fields = _Fields(path, place, entry)
+        fields = Fields(path, place, entry)
         number = fields.count("id")
         if number in marks:
             raise DatasetError(f"{path}: {place}: landmark id {number} occurs twice.")
@@ -192,10 +136,16 @@ def _landmarks(root: _Fields) -> dict[int, Landmark]:
             raise
         except InputError as error:
             raise DatasetError(f"{path}: {place}: {error.message}") from error
+    for one, other in combinations(marks.values(), 2):
+        if math.dist(one.position, other.position) < _APART:
+            raise DatasetError(
+                f"{path}: landmarks: {one.id} and {other.id} stand in the same place, "
+                f"({one.x:g}, {one.y:g}): expected places of their own."
+            )
     return marks
 
 
-def _samples(folder: Path) -> tuple[Sample, ...]:
+def _samples(folder: Path, pan: tuple[float, float]) -> tuple[Sample, ...]:
     path = folder / "samples.jsonl"
     samples: list[Sample] = []
     last = -math.inf
@@ -204,7 +154,7 @@ def _samples(folder: Path) -> tuple[Sample, ...]:
         if not line.strip():
             continue
         where = Path(f"{path}:{number}")
-        fields = _Fields(where, "sample", _parse(line, where))
+        fields = Fields(where, "sample", parse_json(line, where))
         stamp = fields.number("t")
         if stamp < last:
             raise DatasetError(f"{where}: t = {stamp} follows {last}: expected rising times.")
@@ -214,38 +164,20 @@ def _samples(folder: Path) -> tuple[Sample, ...]:
             steering = fields.number("steering")
             if abs(steering) >= math.radians(89):
                 raise DatasetError(f"{where}: steering is {steering}: expected less than 89 deg.")
-            samples.append(Odometry(stamp, fields.number("speed"), steering))
+            speed = fields.number("speed", within=(-_FASTEST, _FASTEST))
+            samples.append(Odometry(stamp, speed, steering))
         elif kind == "pan":
-            samples.append(PanReading(stamp, fields.number("angle")))
+            samples.append(PanReading(stamp, fields.number("angle", within=pan)))
         elif kind == "frame":
             picture = folder / fields.text("file")
             if not _is_file(picture):
-                raise DatasetError(f"{where}: there is no picture {_shown(str(picture))}.")
+                raise DatasetError(f"{where}: there is no picture {shown(str(picture))}.")
             samples.append(FrameFile(stamp, picture, number))
         else:
             raise DatasetError(f"{where}: kind is {kind!r}: expected 'drive', 'pan' or 'frame'.")
     if not any(isinstance(sample, FrameFile) for sample in samples):
         raise DatasetError(f"{path}: expected at least one sample of kind 'frame'.")
-    # A picture is read with all that was known at its moment.
-    samples.sort(key=lambda sample: (sample.stamp, isinstance(sample, FrameFile)))
-    return tuple(samples)
-
-
-def _parse(text: str, where: Path) -> Any:
-    """JSON; ``where`` is the file, or file and line where each line is a document."""
-    try:
-        return json.loads(text)
-    except json.JSONDecodeError as error:
-        line = f":{error.lineno}" if where.is_file() else ""
-        raise DatasetError(f"{where}{line}: no valid JSON: {error.msg}.") from error
-    except (ValueError, RecursionError) as error:  # endless digits, endless brackets
-        raise DatasetError(f"{where}: no JSON that can be read: {error}.") from error
-
-
-def _shown(value: Any) -> str:
-    """A value as messages show it, short."""
-    text = repr(value)
-    return text if len(text) <= 80 else f"{text[:77]}..."
+    return in_order(samples)
 
 
 def _is_file(path: Path) -> bool:

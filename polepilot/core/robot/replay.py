@@ -25,14 +25,14 @@ from polepilot.core.observation import (
     RangeBearing,
     Status,
 )
-from polepilot.core.robot.dataset import Dataset, FrameFile
+from polepilot.core.robot.dataset import Dataset, FrameFile, Sighted
 from polepilot.core.robot.smoother import Picture, Smoother
 from polepilot.core.trajectory import format_tum
 
 See = Callable[[FrameFile], Sequence[Detection]]
 """Reads the landmarks of a picture. Raises ImageError where it is none."""
 
-_CLOCK_JUMP = 2.0
+_CLOCK_JUMP = 1.0
 """Seconds without any sample after which nobody knows how the robot has moved."""
 _SEARCH = 10.0
 """Pictures so long before a pose was found may have led to it, seconds."""
@@ -123,10 +123,11 @@ def replay(
 ) -> ReplayResult:
     """Run the localizer over ``dataset``; ``see`` reads each picture, ``progress`` counts them.
 
+    Where the recording keeps measurements instead of pictures (a run's log), nothing is read again.
     A pose that is lost is looked for again at once, in motion too. A picture that cannot be read
     is left out and reported as the event ``frame_skipped``.
     """
-    settings = settings or LocalizerSettings()
+    settings = settings or dataset.settings
     half_range = max(abs(dataset.pan_minimum), abs(dataset.pan_maximum))
     settings = replace(settings, noise=replace(settings.noise, pan_range=half_range))
     localizer = Localizer(dataset.landmarks, dataset.vehicle, dataset.camera.forward, settings)
@@ -185,7 +186,7 @@ def smooth(dataset: Dataset, result: ReplayResult) -> list[tuple[float, Pose2D]]
     Wherever the pose was lost and found again a new stretch begins, which knows nothing of the
     one before; pictures from which it was found count for it.
     """
-    settings = LocalizerSettings()
+    settings = dataset.settings
     half_range = max(abs(dataset.pan_minimum), abs(dataset.pan_maximum))
     motors, servo = result.lags
     history = OdometryHistory(
@@ -256,8 +257,12 @@ def write_results(
         raise DatasetError(f"{out}: the results cannot be written ({error}).") from error
 
 
-def _look(frame: FrameFile, see: See, pan: PanTrack, result: ReplayResult) -> list[RangeBearing]:
+def _look(
+    frame: FrameFile | Sighted, see: See, pan: PanTrack, result: ReplayResult
+) -> list[RangeBearing]:
     """What one picture tells, with the pan angle of its moment."""
+    if isinstance(frame, Sighted):
+        return list(frame.measurements)
     try:
         detections = see(frame)
     except ImageError as error:

@@ -1,0 +1,388 @@
+"""How well a standing robot will know its pose, at every spot of a site.
+
+One sweep of the camera is summed up in the information matrix of everything that it reads, weighted
+as `fix` does. Its inverse is the covariance of the pose. A spot's figure is the root mean square
+over the headings at which the robot may stand there and `fix` would answer; where `fix` would
+refuse at every heading, the spot has a reason and no figure.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from polepilot.core.errors import InputError
+from polepilot.core.landmark import Landmark
+from polepilot.core.localization.precision_sight import Bools, Floats, Sight, Stands, Sweep, Walls
+from polepilot.core.site import Site
+
+COARSE_SPOTS = 1200
+"""So many spots, about, make the map that is redrawn while a landmark is dragged."""
+FINE_SPOTS = 20_000
+MOST_SPOTS = 200_000
+_STEPS = tuple(
+    step * 10.0**power
+    for power in range(-3, 4)
+    for step in (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0)
+)
+_BLOCK = 16_384
+"""Stands that are worked on at once: as much as fits into a processor's cache, roughly."""
+_CACHE_BYTES = 64_000_000
+_CERTAIN = 1e-9
+"""A determinant below this share of the diagonal's product is that of a singular matrix."""
+
+
+class Reason(IntEnum):
+    """Why there is no figure at a spot."""
+
+    FIX = 0
+    """There is one."""
+    NONE = 1
+    """No landmark is seen."""
+    ONE_LANDMARK = 2
+    ONE_DIRECTION = 3
+    """Landmarks are seen, but the pose would be vaguer than a fix may be."""
+    OUTSIDE = 4
+    """The robot cannot stand there."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PrecisionMap:
+    """Rows of square cells, ``resolution`` wide, from the lower left one's centre (``x``, ``y``).
+
+    Arrays are rows x columns. ``position`` and ``heading`` are nan where ``reason`` is not FIX.
+    """
+
+    x: float
+    y: float
+    resolution: float
+    position: Floats
+    """Standard deviation along the worst direction, metres."""
+    heading: Floats
+    """Standard deviation, radians."""
+    share: Floats
+    """Of the headings that are possible at the spot, at how many a fix is."""
+    seen: Floats
+    """Landmarks read in one sweep, mean over the headings."""
+    reason: NDArray[np.uint8]
+    limit: float
+    """What `overall` counts a spot without a fix as: the vaguest position that a fix may have."""
+
+    @property
+    def floor(self) -> Bools:
+        """The cells at which the robot can stand."""
+        result: Bools = self.reason != Reason.OUTSIDE
+        return result
+
+    @property
+    def fixed(self) -> Bools:
+        """The cells with figures."""
+        result: Bools = self.reason == Reason.FIX
+        return result
+
+    @property
+    def coverage(self) -> float:
+        """Of all ways to stand on the floor, the share at which a fix is possible."""
+        return float(self.share[self.floor].mean())
+
+    @property
+    def mean_position(self) -> float | None:
+        """Mean over the spots with a fix, metres."""
+        return float(self.position[self.fixed].mean()) if self.fixed.any() else None
+
+    @property
+    def worst_position(self) -> float | None:
+        return float(self.position[self.fixed].max()) if self.fixed.any() else None
+
+    @property
+    def mean_heading(self) -> float | None:
+        """Mean over the spots with a fix, radians."""
+        return float(self.heading[self.fixed].mean()) if self.fixed.any() else None
+
+    @property
+    def overall(self) -> float:
+        """Mean over the whole floor, what has no fix counted as ``limit``, metres.
+
+        For comparing two sets of landmarks: a landmark that makes a vague fix possible where there
+        was none would otherwise make the mean worse.
+        """
+        share = self.share[self.floor]
+        squared = np.nan_to_num(self.position[self.floor]) ** 2
+        return float(np.sqrt(share * squared + (1.0 - share) * self.limit**2).mean())
+
+    def to_json(self) -> dict[str, Any]:
+        """Rows from the lowest y on, null where there is no figure; tenths of a millimetre."""
+        return {
+            "x": self.x,
+            "y": self.y,
+            "resolution": self.resolution,
+            "columns": self.position.shape[1],
+            "rows": self.position.shape[0],
+            "position": _listed(self.position, 4),
+            "heading": _listed(self.heading, 5),
+            "share": _listed(np.where(self.floor, self.share, np.nan), 3),
+            "seen": _listed(np.where(self.floor, self.seen, np.nan), 2),
+            "reason": self.reason.tolist(),
+            **self.summary(),
+        }
+
+    def summary(self) -> dict[str, Any]:
+        """The figures for the whole site."""
+        return {
+            "mean_position": self.mean_position,
+            "worst_position": self.worst_position,
+            "mean_heading": self.mean_heading,
+            "overall": self.overall,
+            "coverage": self.coverage,
+            "limit": self.limit,
+        }
+
+
+class PrecisionField:
+    """The spots of one site at one resolution. It remembers what each landmark tells at them, so
+    that moving one landmark costs no more than that landmark."""
+
+    def __init__(self, site: Site, sweep: Sweep | None = None, resolution: float | None = None):
+        """``resolution`` None: as coarse as for a map that is redrawn all the time.
+
+        Raises:
+            InputError: ``resolution`` is not positive, makes too many spots, or leaves none.
+        """
+        self.sweep = sweep or Sweep()
+        self.resolution = coarse_resolution(site) if resolution is None else resolution
+        if not (math.isfinite(self.resolution) and self.resolution > 0):
+            raise InputError(f"resolution is {resolution} m: expected more than 0.")
+        floor = site.floor()
+        x0, y0, x1, y1 = floor.bounds
+        columns = max(1, math.ceil((x1 - x0) / self.resolution))
+        rows = max(1, math.ceil((y1 - y0) / self.resolution))
+        if columns * rows > MOST_SPOTS:
+            raise InputError(
+                f"resolution is {self.resolution:g} m, which makes {columns * rows} spots: expected"
+                f" at most {MOST_SPOTS}."
+            )
+        # The grid's middle is the floor's middle: what is symmetric stays so.
+        self.x = 0.5 * (x0 + x1 - (columns - 1) * self.resolution)
+        self.y = 0.5 * (y0 + y1 - (rows - 1) * self.resolution)
+        xs = self.x + self.resolution * np.arange(columns)
+        ys = self.y + self.resolution * np.arange(rows)
+        grid = np.stack(np.meshgrid(xs, ys), axis=-1)
+        shapely.prepare(floor)
+        self._inside: Bools = shapely.contains_xy(floor, grid[..., 0], grid[..., 1])
+        self.spots: Floats = grid[self._inside]
+        walls = Walls(site.segments())
+        directions = np.tile(self.sweep.directions, len(self.spots))
+        places = np.repeat(self.spots, self.sweep.headings, axis=0)
+        poses = np.concatenate([places, directions[:, None]], axis=1)
+        step = max(1, _BLOCK // self.sweep.headings) * self.sweep.headings
+        self._blocks = [
+            Stands(poses[i : i + step], self.sweep, walls) for i in range(0, len(poses), step)
+        ]
+        self._memory: OrderedDict[Landmark, list[Sight]] = OrderedDict()
+        stands = sum(map(len, self._blocks))
+        if not any(block.possible.any() for block in self._blocks):
+            raise InputError(
+                f"resolution is {self.resolution:g} m: no spot of that grid is on the floor;"
+                " expected a finer one."
+            )
+        self._room = _CACHE_BYTES // (stands * (6 * 8 + 1))
+
+    @property
+    def possible(self) -> Bools:
+        """Whether the robot can stand there: spots x headings."""
+        return np.concatenate([block.possible for block in self._blocks]).reshape(
+            -1, self.sweep.headings
+        )
+
+    def precision(self, landmarks: Sequence[Landmark]) -> PrecisionMap:
+        """The map for these landmarks."""
+        parts = [
+            _judge(*self._told(index, landmarks), block.possible, self.sweep)
+            for index, block in enumerate(self._blocks)
+        ]
+        figures = [np.concatenate(column) for column in zip(*parts, strict=True)]
+        position, heading, share, seen = (self._laid(values, np.nan) for values in figures[:4])
+        return PrecisionMap(
+            x=float(self.x),
+            y=float(self.y),
+            resolution=float(self.resolution),
+            position=position,
+            heading=heading,
+            share=np.nan_to_num(share),
+            seen=np.nan_to_num(seen),
+            reason=self._laid(figures[4], Reason.OUTSIDE).astype(np.uint8),
+            limit=self.sweep.fix.max_position_sigma,
+        )
+
+    def information(self, landmarks: Sequence[Landmark]) -> Floats:
+        """Of one sweep, 6 (xx, xy, yy, xh, yh, hh) x spots x headings."""
+        told = [self._told(index, landmarks)[0] for index in range(len(self._blocks))]
+        return np.concatenate(told, axis=1).reshape(6, -1, self.sweep.headings)
+
+    def alone(self, mark: Landmark) -> Floats:
+        """`information` of one landmark that no other one hides, remembered no longer."""
+        told = [block.sight(mark).information for block in self._blocks]
+        return np.concatenate(told, axis=1).reshape(6, -1, self.sweep.headings)
+
+    def _told(self, index: int, landmarks: Sequence[Landmark]) -> tuple[Floats, Floats]:
+        """Information and number of landmarks at the stands of one block."""
+        return _sum(self._blocks[index], landmarks, [self._sight(index, m) for m in landmarks])
+
+    def _sight(self, index: int, mark: Landmark) -> Sight:
+        known = self._memory.get(mark)
+        if known is not None:
+            self._memory.move_to_end(mark)
+            return known[index]
+        if self._room < 2:
+            return self._blocks[index].sight(mark)
+        known = self._memory[mark] = [block.sight(mark) for block in self._blocks]
+        while len(self._memory) > self._room:
+            self._memory.popitem(last=False)
+        return known[index]
+
+    def _laid(self, values: NDArray[Any], outside: float) -> NDArray[Any]:
+        laid = np.full(self._inside.shape, outside)
+        laid[self._inside] = values
+        return laid
+
+
+def precision_map(
+    site: Site, sweep: Sweep | None = None, resolution: float | None = None
+) -> PrecisionMap:
+    """Expected error at every spot of a site, with the landmarks that it has.
+
+    Args:
+        resolution: metres from spot to spot; None is `coarse_resolution`.
+
+    Raises:
+        InputError: ``resolution`` cannot be used for this site.
+    """
+    return PrecisionField(site, sweep, resolution).precision(site.landmarks)
+
+
+def precision_at(
+    site: Site, poses: Floats, sweep: Sweep | None = None
+) -> tuple[Floats, NDArray[np.uint8]]:
+    """What `fix` will say of its own error at given poses of `base_link`.
+
+    Args:
+        poses: M x 3: x, y, heading; metres and radians.
+
+    Returns:
+        covariances, M x 3 x 3 (m, rad), nan where there would be no fix; and the `Reason` of each.
+    """
+    sweep = sweep or Sweep()
+    stands = Stands(np.asarray(poses, float).reshape(-1, 3), sweep, Walls(site.segments()))
+    sights = [stands.sight(mark) for mark in site.landmarks]
+    information, count = _sum(stands, site.landmarks, sights)
+    verdict = _verdict(information, count, stands.possible, sweep)
+    covariances = np.full((len(stands), 3, 3), np.nan)
+    matrices = information[np.array([[0, 1, 3], [1, 2, 4], [3, 4, 5]])]
+    fixed = verdict.reason == Reason.FIX
+    covariances[fixed] = np.linalg.inv(matrices.transpose(2, 0, 1)[fixed])
+    return covariances, verdict.reason
+
+
+def coarse_resolution(site: Site) -> float:
+    """A round number of metres that makes about `COARSE_SPOTS` spots."""
+    return round_resolution(site, COARSE_SPOTS)
+
+
+def fine_resolution(site: Site) -> float:
+    """A round number of metres that makes about `FINE_SPOTS` spots."""
+    return round_resolution(site, FINE_SPOTS)
+
+
+def round_resolution(site: Site, spots: int) -> float:
+    """The finest round step that makes no more than about ``spots`` spots on the floor, metres.
+
+    Where the floor is a small part of its bounding box, that counts: a tenth of it at least.
+    """
+    floor = site.floor()
+    x0, y0, x1, y1 = floor.bounds
+    area = max(floor.area, 0.1 * (x1 - x0) * (y1 - y0))
+    wanted = math.sqrt(area / spots)
+    return next((step for step in _STEPS if step >= 0.999 * wanted), _STEPS[-1])
+
+
+def _sum(
+    stands: Stands, landmarks: Sequence[Landmark], sights: Sequence[Sight]
+) -> tuple[Floats, Floats]:
+    """Information of all landmarks together, and how many of them are read, at each stand."""
+    total, count = np.zeros((6, len(stands))), np.zeros(len(stands))
+    for sight, free in zip(sights, stands.uncovered(landmarks), strict=True):
+        read = sight.seen & free
+        total += sight.information * read
+        count += read
+    return total, count
+
+
+class _Verdict(NamedTuple):
+    """What `fix` would say at each stand."""
+
+    position: Floats
+    """Variance along the worst direction; meaningless where ``reason`` is not FIX."""
+    heading: Floats
+    reason: NDArray[np.uint8]
+
+
+def _verdict(information: Floats, count: Floats, possible: Bools, sweep: Sweep) -> _Verdict:
+    xx, xy, yy, xh, yh, hh = information
+    # The inverse of a symmetric 3 x 3 matrix, by its cofactors.
+    a, b, d = yy * hh - yh * yh, xh * yh - xy * hh, xx * hh - xh * xh
+    c, e = xy * yh - xh * yy, xx * yy - xy * xy
+    determinant = xx * a + xy * b + xh * c
+    regular = (count >= 2) & (determinant > _CERTAIN * xx * yy * hh)
+    scale = np.where(regular, determinant, np.inf)
+    half, apart = 0.5 * (a + d), np.hypot(0.5 * (a - d), b)
+    position, heading = (half + apart) / scale, e / scale
+    settings = sweep.fix
+    sharp = (position <= settings.max_position_sigma**2) & (
+        heading <= settings.max_heading_sigma**2
+    )
+    reason = np.select(
+        [~possible, count == 0, count == 1, regular & sharp],
+        [Reason.OUTSIDE, Reason.NONE, Reason.ONE_LANDMARK, Reason.FIX],
+        Reason.ONE_DIRECTION,
+    )
+    return _Verdict(position, heading, reason.astype(np.uint8))
+
+
+def _judge(
+    information: Floats, count: Floats, possible: Bools, sweep: Sweep
+) -> tuple[Floats, Floats, Floats, Floats, NDArray[Any]]:
+    """Figures per spot: what `fix` would say at each stand, averaged over the headings."""
+    verdict = _verdict(information, count, possible, sweep)
+    good = verdict.reason == Reason.FIX
+
+    def mean(values: Floats, where: Bools) -> Floats:
+        chosen = where.reshape(-1, sweep.headings)
+        number = chosen.sum(axis=1)
+        total = np.where(chosen, values.reshape(-1, sweep.headings), 0.0).sum(axis=1)
+        result: Floats = np.where(number > 0, total / np.maximum(number, 1), np.nan)
+        return result
+
+    share = mean(good.astype(float), possible)
+    # The nearest that it comes to a fix at any heading.
+    code = np.where(possible, verdict.reason, 0).reshape(-1, sweep.headings).max(axis=1)
+    reason = np.where(share > 0, Reason.FIX, np.where(np.isnan(share), Reason.OUTSIDE, code))
+    return (
+        np.sqrt(mean(verdict.position, good)),
+        np.sqrt(mean(verdict.heading, good)),
+        share,
+        mean(count, possible),
+        reason,
+    )
+
+
+def _listed(values: Floats, digits: int) -> list[list[float | None]]:
+    rounded = np.round(values, digits)
+    return [[None if value != value else value for value in row] for row in rounded.tolist()]

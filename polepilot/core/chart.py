@@ -209,7 +209,7 @@ def steps(low: float, high: float) -> list[float]:
 def _as_svg(part: _Line | _Dot | _Text) -> str:
     if isinstance(part, _Line):
         path = "M" + "L".join(f"{_n(x)} {_n(y)}" for x, y in part.points)
-        dash = ' stroke-dasharray="5 3"' if part.dashed else ""
+        dash = ' stroke-dasharray="6 4"' if part.dashed else ""
         return (
             f'<path d="{path}" fill="none" stroke="{part.color}" stroke-width="{part.width:g}" '
             f'stroke-linejoin="round"{dash}/>'
@@ -250,12 +250,12 @@ def _on_image(image: NDArray[np.uint8], part: _Line | _Dot | _Text) -> None:
 
 
 def _dashes(points: Array) -> list[Array]:
-    """A line cut into dashes of 5 points with gaps of 3."""
+    """A line cut into dashes of 6 points with gaps of 4."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    starts = np.arange(0.0, along[-1], 8.0)
+    starts = np.arange(0.0, along[-1], 10.0)
     cut = []
     for start in starts:
-        end = min(start + 5.0, float(along[-1]))
+        end = min(start + 6.0, float(along[-1]))
         inside = along[(along > start) & (along < end)]
         at = np.concatenate([[start], inside, [end]])
         cut.append(np.stack([np.interp(at, along, points[:, i]) for i in (0, 1)], axis=1))

@@ -21,6 +21,7 @@ from polepilot.commands import bench, calibrate, landmarks
 from polepilot.commands.detect import detect
 from polepilot.commands.evaluate import evaluate
 from polepilot.commands.plan import plan
+from polepilot.commands.precision import precision
 from polepilot.commands.replay import replay
 from polepilot.commands.serve import serve
 from polepilot.commands.simulate import simulate
@@ -33,7 +34,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for _command in (serve, detect, plan, simulate, replay, evaluate):
+for _command in (serve, detect, plan, precision, simulate, replay, evaluate):
     app.command()(_command)
 app.add_typer(landmarks.app, name="landmarks", help="Print landmarks to scale, choose their ids.")
 app.add_typer(calibrate.app, name="calibrate", help="Camera constant, lens, pan unit.")

@@ -28,6 +28,8 @@ COARSE_SPOTS = 1200
 """So many spots, about, make the map that is redrawn while a landmark is dragged."""
 FINE_SPOTS = 20_000
 MOST_SPOTS = 200_000
+CLASSES = (0.005, 0.0075, 0.01, 0.015, 0.02, 0.03)
+"""Where the colours of a drawn map change, metres: always the same, so that maps compare."""
 _STEPS = tuple(
     step * 10.0**power
     for power in range(-3, 4)
@@ -36,6 +38,8 @@ _STEPS = tuple(
 _BLOCK = 16_384
 """Stands that are worked on at once: as much as fits into a processor's cache, roughly."""
 _CACHE_BYTES = 64_000_000
+_SLIVER = 1e-6
+"""Cells with less floor than this share are left out."""
 _CERTAIN = 1e-9
 """A determinant below this share of the diagonal's product is that of a singular matrix."""
 
@@ -73,6 +77,8 @@ class PrecisionMap:
     seen: Floats
     """Landmarks read in one sweep, mean over the headings."""
     reason: NDArray[np.uint8]
+    weight: Floats
+    """Which share of the cell is floor: means are means over the floor."""
     limit: float
     """What `overall` counts a spot without a fix as: the vaguest position that a fix may have."""
 
@@ -91,12 +97,12 @@ class PrecisionMap:
     @property
     def coverage(self) -> float:
         """Of all ways to stand on the floor, the share at which a fix is possible."""
-        return float(self.share[self.floor].mean())
+        return float(np.average(self.share, weights=self.weight * self.floor))
 
     @property
     def mean_position(self) -> float | None:
         """Mean over the spots with a fix, metres."""
-        return float(self.position[self.fixed].mean()) if self.fixed.any() else None
+        return self._mean(self.position)
 
     @property
     def worst_position(self) -> float | None:
@@ -105,7 +111,7 @@ class PrecisionMap:
     @property
     def mean_heading(self) -> float | None:
         """Mean over the spots with a fix, radians."""
-        return float(self.heading[self.fixed].mean()) if self.fixed.any() else None
+        return self._mean(self.heading)
 
     @property
     def overall(self) -> float:
@@ -114,9 +120,18 @@ class PrecisionMap:
         For comparing two sets of landmarks: a landmark that makes a vague fix possible where there
         was none would otherwise make the mean worse.
         """
-        share = self.share[self.floor]
-        squared = np.nan_to_num(self.position[self.floor]) ** 2
-        return float(np.sqrt(share * squared + (1.0 - share) * self.limit**2).mean())
+        squared = np.nan_to_num(self.position) ** 2
+        values = np.sqrt(self.share * squared + (1.0 - self.share) * self.limit**2)
+        return float(np.average(values, weights=self.weight * self.floor))
+
+    def area(self, reason: Reason) -> float:
+        """Floor with this reason, square metres."""
+        return float(self.weight[self.reason == reason].sum()) * self.resolution**2
+
+    def _mean(self, values: Floats) -> float | None:
+        if not self.fixed.any():
+            return None
+        return float(np.average(values[self.fixed], weights=self.weight[self.fixed]))
 
     def to_json(self) -> dict[str, Any]:
         """Rows from the lowest y on, null where there is no figure; tenths of a millimetre."""
@@ -154,7 +169,8 @@ class PrecisionField:
         """``resolution`` None: as coarse as for a map that is redrawn all the time.
 
         Raises:
-            InputError: ``resolution`` is not positive, makes too many spots, or leaves none.
+            InputError: ``resolution`` is not positive, makes too many spots, or the robot has
+                room at none.
         """
         self.sweep = sweep or Sweep()
         self.resolution = coarse_resolution(site) if resolution is None else resolution
@@ -172,12 +188,8 @@ class PrecisionField:
         # The grid's middle is the floor's middle: what is symmetric stays so.
         self.x = 0.5 * (x0 + x1 - (columns - 1) * self.resolution)
         self.y = 0.5 * (y0 + y1 - (rows - 1) * self.resolution)
-        xs = self.x + self.resolution * np.arange(columns)
-        ys = self.y + self.resolution * np.arange(rows)
-        grid = np.stack(np.meshgrid(xs, ys), axis=-1)
-        shapely.prepare(floor)
-        self._inside: Bools = shapely.contains_xy(floor, grid[..., 0], grid[..., 1])
-        self.spots: Floats = grid[self._inside]
+        self._weight, self.spots = self._cells(floor, columns, rows)
+        self._inside: Bools = self._weight > 0
         walls = Walls(site.segments())
         directions = np.tile(self.sweep.directions, len(self.spots))
         places = np.repeat(self.spots, self.sweep.headings, axis=0)
@@ -190,10 +202,39 @@ class PrecisionField:
         stands = sum(map(len, self._blocks))
         if not any(block.possible.any() for block in self._blocks):
             raise InputError(
-                f"resolution is {self.resolution:g} m: no spot of that grid is on the floor;"
+                f"resolution is {self.resolution:g} m: at no spot of that grid the robot has room;"
                 " expected a finer one."
             )
         self._room = _CACHE_BYTES // (stands * (6 * 8 + 1))
+
+    def _cells(self, floor: shapely.Geometry, columns: int, rows: int) -> tuple[Floats, Floats]:
+        """Which share of each cell is floor, and the spots of those cells that have some.
+
+        A spot is the cell's middle, or where that is no floor, some place of the cell that is.
+        """
+        xs = self.x + self.resolution * np.arange(columns)
+        ys = self.y + self.resolution * np.arange(rows)
+        half = 0.5 * self.resolution
+        grid = np.stack(np.meshgrid(xs, ys), axis=-1)
+        x, y = grid[..., 0], grid[..., 1]
+        boxes = shapely.box(x - half, y - half, x + half, y + half)
+        shapely.prepare(floor)
+        weight = shapely.covers(floor, boxes).astype(float)
+        edge = shapely.intersects(floor, boxes) & (weight == 0)
+        cut = shapely.intersection(floor, boxes[edge])
+        share = shapely.area(cut) / self.resolution**2
+        weight[edge] = np.where(share > _SLIVER, share, 0.0)
+        elsewhere = ~shapely.contains_xy(floor, x[edge], y[edge]) & (share > _SLIVER)
+        points = shapely.point_on_surface(cut[elsewhere])
+        places = grid[edge]
+        places[elsewhere] = np.stack([shapely.get_x(points), shapely.get_y(points)], axis=-1)
+        grid[edge] = places
+        return weight, grid[weight > 0]
+
+    @property
+    def weights(self) -> Floats:
+        """Of each spot, which share of its cell is floor."""
+        return self._weight[self._inside]
 
     @property
     def possible(self) -> Bools:
@@ -219,6 +260,7 @@ class PrecisionField:
             share=np.nan_to_num(share),
             seen=np.nan_to_num(seen),
             reason=self._laid(figures[4], Reason.OUTSIDE).astype(np.uint8),
+            weight=self._weight,
             limit=self.sweep.fix.max_position_sigma,
         )
 

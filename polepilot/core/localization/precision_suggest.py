@@ -1,10 +1,11 @@
 """Where more landmarks help most: greedy over places along walls, with bounds on what is possible.
 
-The gain of a set of places is the mean over all stands of ½ log det(I₀ + I), where I is the
-information of all landmarks and I₀ that of a pose known just as vaguely as a fix may be at most.
-Landmarks add up in I, so that the gain is monotone and submodular: what the greedy choice reached
-after k places, plus the k largest gains that single places could add to it, is more than any k of
-the same places can reach (the same after each earlier step; the smallest of these counts).
+The gain of a set of places is the mean of ½ log det(I₀ + I) over all stands (a spot and a
+heading), where I is the information of all landmarks and I₀ that of a pose known just as vaguely as
+a fix may be at most. Landmarks add up in I, so that the gain is monotone and submodular: what the
+greedy choice reached after k places, plus the k largest gains that single places could add to it,
+is more than any k of the same places can reach (the same after each earlier step; the smallest of
+these counts).
 
 The gain is counted in information, which is what makes the bound hold; people want centimetres. So
 there is a second bound on the mean error itself: what it would be if a landmark stood at every one
@@ -246,4 +247,4 @@ def _least_error(
     laid[possible] = variance
     number = possible.sum(axis=1)
     spots = laid.sum(axis=1)[number > 0] / number[number > 0]
-    return float(np.sqrt(spots).mean())
+    return float(np.average(np.sqrt(spots), weights=field.weights[number > 0]))

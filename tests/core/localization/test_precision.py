@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 from numpy.typing import NDArray
 
 from polepilot.core.errors import InputError
@@ -82,7 +83,8 @@ def random_poses(site: Site, number: int, rng: np.random.Generator) -> Floats:
         x, y = field.spots[rng.integers(len(field.spots))]
         x, y = (x, y) + rng.uniform(-0.5, 0.5, 2) * field.resolution
         pose = np.array([x, y, rng.uniform(-math.pi, math.pi)])
-        if Scenery(site.segments()).distance((x, y)) < 0.14:
+        room = Scenery(site.segments()).distance((x, y)) >= 0.14
+        if not (room and shapely.intersects_xy(site.floor(), x, y)):
             continue
         if precision_at(site, pose)[1][0] == Reason.FIX:
             found.append(pose)
@@ -265,7 +267,8 @@ class TestWhatIsSeen:
         middle = round((2.95 - found.y) / 0.1), round((3.5 - found.x) / 0.1)
         assert found.reason[middle] == Reason.OUTSIDE
         assert math.isnan(found.position[middle])
-        assert found.floor.sum() * 0.01 == pytest.approx(DEMO.floor().area, rel=0.03)
+        whole = sum(found.area(reason) for reason in Reason)
+        assert whole == pytest.approx(DEMO.floor().area, rel=1e-6)
 
     def test_a_slot_too_narrow_for_the_camera(self) -> None:
         """The lens, 10 cm ahead of the axle, cannot be beyond a wall."""
@@ -376,12 +379,19 @@ class TestMap:
         with pytest.raises(InputError, match="resolution"):
             precision_map(DEMO, resolution=resolution)
 
-    def test_a_grid_that_misses_the_floor(self) -> None:
-        ring = replace(
-            ROOM, islands=(((0.2, 0.2), (7.8, 0.2), (7.8, 5.8), (0.2, 5.8)),), landmarks=()
-        )
-        with pytest.raises(InputError, match="no spot"):
-            precision_map(ring, resolution=8.0)
+    def test_a_slot_in_which_the_camera_has_no_room(self) -> None:
+        slot = site_of("slot", rectangle(0.06, 0.06), [])
+        with pytest.raises(InputError, match="has room"):
+            precision_map(slot)
+
+    def test_every_piece_of_floor_has_a_spot(self) -> None:
+        """Cells whose middle is in the wall as well: a corridor beside an island."""
+        island = ((0.5, 0.5), (7.7, 0.5), (7.7, 5.5), (0.5, 5.5))
+        field = PrecisionField(replace(ROOM, islands=(island,)), resolution=1.0)
+        found = field.precision(ROOM.landmarks)
+        assert sum(found.area(reason) for reason in Reason) == pytest.approx(48 - 36)
+        assert (found.weight > 0).sum() == len(field.spots) == 48 - 24
+        assert shapely.intersects_xy(shapely.Polygon(island), *field.spots.T).sum() == 0
 
     def test_settings_that_cannot_be(self) -> None:
         for wrong in ({"headings": 0}, {"headings": 1000}, {"readings": 0}):

@@ -25,6 +25,7 @@ from polepilot.commands.precision import precision
 from polepilot.commands.replay import replay
 from polepilot.commands.serve import serve
 from polepilot.commands.simulate import simulate
+from polepilot.commands.survey import survey
 from polepilot.core.errors import InputError, PolepilotError, RefusedError
 
 app = typer.Typer(
@@ -34,7 +35,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for _command in (serve, detect, plan, precision, simulate, replay, evaluate):
+for _command in (serve, detect, plan, precision, simulate, replay, evaluate, survey):
     app.command()(_command)
 app.add_typer(landmarks.app, name="landmarks", help="Print landmarks to scale, choose their ids.")
 app.add_typer(calibrate.app, name="calibrate", help="Camera constant, lens, pan unit.")

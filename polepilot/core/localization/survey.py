@@ -67,7 +67,7 @@ class SurveyOptions:
     distance_sigma: float = 0.005
     start: Pose2D | None = None
     """Where the drive began, if coordinates refer to that; else it began at the origin."""
-    range_sigma: float = 0.002
+    range_sigma: float = 0.001
     """How wrong all ranges may be together, as a share: landmarks' size, camera constant."""
 
     def __post_init__(self) -> None:

@@ -28,9 +28,9 @@ _PAN_PRIORS = tuple(math.radians(v) for v in (1.0, 1.5, 0.8, 1.0, 0.4, 0.4))
 _PRIORS = np.array([0.1, math.radians(3.0), 0.08, 0.06, math.nan, *_PAN_PRIORS])
 _GAUGE = np.array([1e-4, 1e-4, 1e-5])
 """How firmly the first node is held where only it says where the map is: metres, radians."""
-_RANGE_FLOOR, _BEARING_FLOOR = 0.003, math.radians(0.10)
+_RANGE_FLOOR, _BEARING_FLOOR = 0.002, math.radians(0.06)
 """What errors of a single sighting are added to those that the detector names."""
-_SHARED_RANGE, _SHARED_BEARING = 0.001, math.radians(0.10)
+_SHARED_RANGE, _SHARED_BEARING = 0.0005, math.radians(0.06)
 """What repeats in every sighting of one pole from one place, as a share of the range and rad."""
 
 
@@ -44,7 +44,7 @@ class Known:
     """Two poles, how far apart they are, and the standard deviation of that."""
     first: Pose2D | None = None
     """The pose of the first node, where no measured poles say where the map is."""
-    range_sigma: float = 0.002
+    range_sigma: float = 0.001
     """Of the common error of all ranges, as a share."""
 
 

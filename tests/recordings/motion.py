@@ -68,7 +68,7 @@ class Driver:
 
     def command(self, x: float, y: float, heading: float) -> Point:
         """Speed and steering, with the robot at this pose."""
-        rng, scenario = self._rng, self._scenario
+        rng = self._rng
         pose = (x, y, heading)
         if self._pause > 0:
             self._pause -= self._tick

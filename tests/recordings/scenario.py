@@ -1,4 +1,4 @@
-"""What a recording is made of, drawn by lot: the place, its poles, the robot's faults, what happens.
+"""What a recording is made of, drawn by lot: place, poles, the robot's faults, what happens.
 
 Metres, radians, seconds. Nothing of polepilot is used here, so that no mistake of its own can hide.
 """
@@ -6,7 +6,7 @@ Metres, radians, seconds. Nothing of polepilot is used here, so that no mistake 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
@@ -141,7 +141,6 @@ class Scenario:
     outdoors: bool = False
     start: float = 0.0
     """Time stamp of the recording's beginning."""
-    quirks: dict[str, float] = field(default_factory=dict)
 
 
 def draw(kind: Kind, seed: int) -> Scenario:
@@ -188,7 +187,7 @@ def draw(kind: Kind, seed: int) -> Scenario:
 def _places(rng: Rng, kind: Kind, size: Point, count: int) -> list[Point]:
     """Along the walls, evenly but for chance; no two nearer than a metre."""
     width, depth = size
-    inset = (0.4, 1.5) if kind == "yard" else (0.12, 0.4)
+    inset = (0.4, 4.0) if kind == "yard" else (0.12, 0.4)
     while True:
         places: list[Point] = []
         first = rng.uniform(0.0, 1.0)

@@ -24,8 +24,8 @@ class Film:
         self._electrons = float(rng.uniform(1500.0, 6000.0))
         self._dark = float(rng.uniform(0.001, 0.003))
         self._sharpen = float(rng.uniform(0.2, 0.6)) if rng.random() < 0.4 else 0.0
-        self._quality = int(rng.integers(75, 96))
-        self._subsampled = bool(rng.random() < 0.6)
+        self._quality = int(rng.integers(85, 98))
+        self._subsampled = bool(rng.random() < 0.33)
         self._noise = rng.standard_normal(BANK, np.float32)
         level = np.arange(65536) / 65535
         curve = np.where(level <= 0.0031308, 12.92 * level, 1.055 * level ** (1 / 2.4) - 0.055)

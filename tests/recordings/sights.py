@@ -10,6 +10,8 @@ from recordings.motion import Course
 from recordings.scenario import Scenario
 
 HEIGHT, DIAMETER = 0.65, 0.07
+BESIDE = 25
+"""Pixels beside the picture within which the middle of a pole may be that is seen in part."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +31,7 @@ class Sight:
 
 
 def sights(scenario: Scenario, course: Course) -> list[tuple[Sight, ...]]:
-    """Of every picture; poles of which at least the middle is between its left and right edge."""
+    """Of every picture; poles of which a part may be in it."""
     eye = scenario.eye
     at = course.frames
     heading = np.interp(at, course.t, course.heading)
@@ -48,7 +50,7 @@ def sights(scenario: Scenario, course: Course) -> list[tuple[Sight, ...]]:
             if number == 0:
                 continue
             bearing = math.remainder(azimuth - float(yaw[index]), math.tau)
-            if abs(bearing) > 1.0 or abs(math.tan(bearing)) * eye.constant > eye.cx:
+            if abs(bearing) > 1.0 or abs(math.tan(bearing)) * eye.constant > eye.cx + BESIDE:
                 continue
             hidden = any(
                 near < far and abs(math.remainder(azimuth - other, math.tau)) < wide

@@ -95,7 +95,7 @@ def table(result: dict[str, Any]) -> str:
         f"{'':10}{'position mean / p95 cm':>30}{'floor':>10}{'target':>10}"
         f"{'heading mean / p95 deg':>26}{'floor':>11}{'target':>11}"
         f"{'poses %':>9}{'NEES':>6}{'in 95 %':>8}{'recov. s':>9}{'sweeps':>7}{'moved cm':>9}"
-        f"{'unaware s':>10}{'us/meas.':>9}"
+        f"{'unaware s':>10}{'us/meas.':>9}{'us/frame':>9}"
     ]
     for kind, row in result.items():
         p, pp, h, hp = LIMITS.get(kind, ((math.nan, math.nan),) * 4)
@@ -107,6 +107,7 @@ def table(result: dict[str, Any]) -> str:
             f"{row['nees_inside_percent']:8.1f}{_or_none(row['recovery_s']):>9}"
             f"{_or_none(row['moved_after_sweeps']):>7}{_or_none(row['moved_error_cm']):>9}"
             f"{row['unaware_s']:10.1f}{row['microseconds_per_measurement']:9.0f}"
+            f"{row['microseconds_per_frame']:9.0f}"
         )
     lines += [
         "",

@@ -18,6 +18,7 @@ from polepilot.server.routes import (
     metrics,
     missions,
     plans,
+    precision,
     robot,
     runs,
     simulation,
@@ -56,7 +57,7 @@ def create_app(services: Services | None = None) -> FastAPI:
     app.state.services = services
     errors.install(app)
     api = APIRouter(prefix="/api/v1")
-    for module in (robot, sites, landmarks, plans, missions, runs, simulation):
+    for module in (robot, sites, precision, landmarks, plans, missions, runs, simulation):
         api.include_router(module.router)
     api.add_api_websocket_route("/stream", _stream)
     app.include_router(api)

@@ -24,6 +24,7 @@ from polepilot.server.missions import Missions
 from polepilot.server.panel_feed import PanelFeed, PanelPort
 from polepilot.server.pictures import Pictures
 from polepilot.server.planner import Planner
+from polepilot.server.precision import Precision
 from polepilot.server.runner import Published, RobotPort, Runner, Twin
 from polepilot.server.store import Store
 from polepilot.server.stream import Hub
@@ -115,6 +116,7 @@ class Services:
         self.pictures = Pictures()
         self.runner = Runner(robot, clock, tick_rate, twin)
         self.planner = Planner(model.vehicle)
+        self.precision = Precision(model)
         self.missions = Missions(store, self.runner, self.planner, twin, folder.log_path)
         self.metrics = Metrics(self.runner, self.hub)
         self.panel_client = httpx.AsyncClient(timeout=_PANEL_TIMEOUT, trust_env=False)
@@ -198,8 +200,9 @@ class Services:
             log.error("the robot's thread did not end")
 
     async def stop_planning(self) -> None:
-        """Answer everybody who waits for a plan that there will be none."""
+        """Answer everybody who waits for a plan or a precision map that there will be none."""
         await self.planner.close()
+        await self.precision.close()
 
     async def _warm_up(self) -> None:
         """What nobody should have to wait for, and what the start should not wait for."""

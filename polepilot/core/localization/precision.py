@@ -36,7 +36,9 @@ _STEPS = tuple(
     for step in (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0)
 )
 _BLOCK = 16_384
-"""Stands that are worked on at once: as much as fits into a processor's cache, roughly."""
+"""Stands that are worked on at once, at most."""
+_TESTS = 2_000_000
+"""Stands times wall segments that are worked on at once, roughly: bounds the memory."""
 _CACHE_BYTES = 64_000_000
 _SLIVER = 1e-6
 """Cells with less floor than this share are left out."""
@@ -178,13 +180,13 @@ class PrecisionField:
             raise InputError(f"resolution is {resolution} m: expected more than 0.")
         floor = site.floor()
         x0, y0, x1, y1 = floor.bounds
-        columns = max(1, math.ceil((x1 - x0) / self.resolution))
-        rows = max(1, math.ceil((y1 - y0) / self.resolution))
-        if columns * rows > MOST_SPOTS:
+        across, along = ((x1 - x0) / self.resolution, (y1 - y0) / self.resolution)
+        if not (max(across, 1.0) * max(along, 1.0) <= MOST_SPOTS):
             raise InputError(
-                f"resolution is {self.resolution:g} m, which makes {columns * rows} spots: expected"
-                f" at most {MOST_SPOTS}."
+                f"resolution is {self.resolution:g} m: this site would have more than {MOST_SPOTS}"
+                " spots; expected a coarser one."
             )
+        columns, rows = max(1, math.ceil(across)), max(1, math.ceil(along))
         # The grid's middle is the floor's middle: what is symmetric stays so.
         self.x = 0.5 * (x0 + x1 - (columns - 1) * self.resolution)
         self.y = 0.5 * (y0 + y1 - (rows - 1) * self.resolution)
@@ -194,7 +196,8 @@ class PrecisionField:
         directions = np.tile(self.sweep.directions, len(self.spots))
         places = np.repeat(self.spots, self.sweep.headings, axis=0)
         poses = np.concatenate([places, directions[:, None]], axis=1)
-        step = max(1, _BLOCK // self.sweep.headings) * self.sweep.headings
+        block = min(_BLOCK, _TESTS // len(site.segments()))
+        step = max(1, block // self.sweep.headings) * self.sweep.headings
         self._blocks = [
             Stands(poses[i : i + step], self.sweep, walls) for i in range(0, len(poses), step)
         ]

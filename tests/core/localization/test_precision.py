@@ -374,7 +374,7 @@ class TestMap:
         assert floor.overall < many < one
         assert many > 0.002  # the map's own 5 mm stay
 
-    @pytest.mark.parametrize("resolution", [0.0, -1.0, math.nan, math.inf, 0.001])
+    @pytest.mark.parametrize("resolution", [0.0, -1.0, math.nan, math.inf, 0.001, 5e-324])
     def test_resolutions_that_cannot_be(self, resolution: float) -> None:
         with pytest.raises(InputError, match="resolution"):
             precision_map(DEMO, resolution=resolution)

@@ -457,6 +457,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/sites/{site_id}/precision": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Site Precision
+         * @description The precision map of a kept site, with its own landmarks or with others.
+         */
+        post: operations["site_precision"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/sites/{site_id}/versions": {
         parameters: {
             query?: never;
@@ -511,6 +531,26 @@ export interface paths {
          * @description Look for what is wrong with a drawing, without keeping it.
          */
         post: operations["check_site"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sites/precision": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Drawn Precision
+         * @description The precision map of a drawing, without keeping it.
+         */
+        post: operations["drawn_precision"];
         delete?: never;
         options?: never;
         head?: never;
@@ -594,6 +634,27 @@ export interface components {
             x: number;
             /** Y */
             y: number;
+        };
+        /**
+         * DrawnPrecisionRequest
+         * @description For a drawing that is not kept.
+         */
+        DrawnPrecisionRequest: {
+            /**
+             * Detail
+             * @default coarse
+             * @enum {string}
+             */
+            detail: "coarse" | "fine";
+            /** Resolution */
+            resolution?: number | null;
+            /** Site */
+            site: components["schemas"]["SiteDocument"];
+            /**
+             * Suggest
+             * @default 0
+             */
+            suggest: number;
         };
         /** EventModel */
         EventModel: {
@@ -887,6 +948,83 @@ export interface components {
             x: number;
             /** Y */
             y: number;
+        };
+        /**
+         * PrecisionRecord
+         * @description How well a standing robot will know its pose: a grid of square cells over the floor.
+         */
+        PrecisionRecord: {
+            /** Classes */
+            classes: number[];
+            /** Columns */
+            columns: number;
+            /** Coverage */
+            coverage: number;
+            /** Heading */
+            heading: (number | null)[][];
+            /** Limit */
+            limit: number;
+            /** Mean Heading */
+            mean_heading: number | null;
+            /** Mean Position */
+            mean_position: number | null;
+            /** Overall */
+            overall: number;
+            /** Position */
+            position: (number | null)[][];
+            /** Reason */
+            reason: number[][];
+            /** Resolution */
+            resolution: number;
+            /** Rows */
+            rows: number;
+            /** Seen */
+            seen: (number | null)[][];
+            /** Share */
+            share: (number | null)[][];
+            suggest?: components["schemas"]["SuggestionsModel"] | null;
+            /** Worst Position */
+            worst_position: number | null;
+            /** X */
+            x: number;
+            /** Y */
+            y: number;
+        };
+        /**
+         * PrecisionRequest
+         * @description For a kept site.
+         */
+        PrecisionRequest: {
+            /**
+             * Detail
+             * @default coarse
+             * @enum {string}
+             */
+            detail: "coarse" | "fine";
+            /** Landmarks */
+            landmarks?: components["schemas"]["LandmarkDocument"][] | null;
+            /** Resolution */
+            resolution?: number | null;
+            /**
+             * Suggest
+             * @default 0
+             */
+            suggest: number;
+        };
+        /** PrecisionSummary */
+        PrecisionSummary: {
+            /** Coverage */
+            coverage: number;
+            /** Limit */
+            limit: number;
+            /** Mean Heading */
+            mean_heading: number | null;
+            /** Mean Position */
+            mean_position: number | null;
+            /** Overall */
+            overall: number;
+            /** Worst Position */
+            worst_position: number | null;
         };
         /** Prediction */
         Prediction: {
@@ -1211,6 +1349,35 @@ export interface components {
             type: "snapshot";
             /** Wall */
             wall: number;
+        };
+        /** SuggestionModel */
+        SuggestionModel: {
+            /** Coverage */
+            coverage: number;
+            /** Id */
+            id: number;
+            /** Mean Position */
+            mean_position: number | null;
+            /** Overall */
+            overall: number;
+            /** X */
+            x: number;
+            /** Y */
+            y: number;
+        };
+        /** SuggestionsModel */
+        SuggestionsModel: {
+            before: components["schemas"]["PrecisionSummary"];
+            /** Gain */
+            gain: number;
+            /** Gain Bound */
+            gain_bound: number;
+            /** Overall Bound */
+            overall_bound: number;
+            /** Places */
+            places: number;
+            /** Suggestions */
+            suggestions: components["schemas"]["SuggestionModel"][];
         };
         /**
          * Track
@@ -2810,6 +2977,77 @@ export interface operations {
             };
         };
     };
+    site_precision: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                site_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["PrecisionRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PrecisionRecord"];
+                };
+            };
+            /** @description A foreign Host or Origin. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no such thing. */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description What was sent is not what was expected; `detail` names it. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The robot or a device does not answer. */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     list_versions: {
         parameters: {
             query?: never;
@@ -2969,6 +3207,66 @@ export interface operations {
             };
             /** @description What was sent is not what was expected; `detail` names it. */
             422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    drawn_precision: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["DrawnPrecisionRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PrecisionRecord"];
+                };
+            };
+            /** @description A foreign Host or Origin. */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body is too large. */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description What was sent is not what was expected; `detail` names it. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The robot or a device does not answer. */
+            503: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -20,17 +20,20 @@ from polepilot.core.vision.images import read_image
 
 See = Callable[[FrameFile], Sequence[Detection]]
 
-FARTHEST = 16.0
-READ = 0.97
-RANGE_SHARE = 0.0010
-HEIGHT_PIXELS = 0.10
-BEARING_PIXELS = 0.16
+FARTHEST = 17.0
+READ = 0.985
+FAINT = 10.0
+"""Metres from which on landmarks are read less often, down to half of them at the farthest."""
+RANGE_SHARE = 0.0004
+HEIGHT_PIXELS = 0.11
+"""Error of the code's height in the picture."""
+BEARING_PIXELS = 0.24
 TAIL = 0.03
-"""Share of the readings that err three times as much."""
+"""Share of the readings that err twice as much."""
 
 
 def drawn(told: Told, seed: int) -> See:
-    """Landmarks with errors by lot: all that stand whole in a picture, but for a few."""
+    """Landmarks with errors by lot, which are those that the detector made of our pictures."""
 
     def see(frame: FrameFile) -> list[Detection]:
         rng = np.random.default_rng([seed, round(frame.stamp * 1e4)])
@@ -42,14 +45,14 @@ def drawn(told: Told, seed: int) -> See:
 
 def _measured(sight: Sight, rng: np.random.Generator) -> Detection | None:
     chance = float(rng.random())
-    errors = rng.standard_normal(2) * (3.0 if rng.random() < TAIL else 1.0)
+    errors = rng.standard_normal(2) * (2.0 if rng.random() < TAIL else 1.0)
     wide = 600 * 0.07 / sight.range
-    if not sight.whole or sight.range > FARTHEST or chance > READ or sight.smear > 1.5 * wide:
+    likely = READ - 0.5 * max(sight.range - FAINT, 0.0) / (FARTHEST - FAINT)
+    if not sight.whole or sight.range > FARTHEST or chance > likely or sight.smear > 2.0 * wide:
         return None
     height = 600 * 0.65 / sight.range
-    blur = 1.0 + sight.smear / (2.0 * wide)
-    sigma = sight.range * float(np.hypot(RANGE_SHARE, blur * HEIGHT_PIXELS / height))
-    turned = blur * BEARING_PIXELS / 600
+    sigma = sight.range * float(np.hypot(RANGE_SHARE, HEIGHT_PIXELS / height))
+    turned = BEARING_PIXELS / 600
     distance = sight.range + sigma * float(errors[0])
     bearing = sight.bearing + turned * float(errors[1])
     column = 199.5 - 600 * float(np.tan(bearing))

@@ -14,9 +14,8 @@ import typer
 if TYPE_CHECKING:
     from polepilot.core.geometry import Point
     from polepilot.core.landmark import LandmarkKind
-    from polepilot.core.localization.survey import SurveyOptions
     from polepilot.core.localization.survey_result import Survey
-    from polepilot.core.localization.survey_run import SurveyRun
+    from polepilot.core.localization.survey_run import SurveyOptions, SurveyRun
     from polepilot.core.observation import PanReading, RangeBearing
     from polepilot.core.robot.dataset import Dataset
     from polepilot.core.site import Site
@@ -84,8 +83,8 @@ def survey(
 
     from polepilot.commands.files import write_whole
     from polepilot.core.errors import InputError
-    from polepilot.core.localization.survey import SurveyOptions
     from polepilot.core.localization.survey import survey as build
+    from polepilot.core.localization.survey_run import SurveyOptions
     from polepilot.core.site import read_site
 
     if plot is not None and plot.suffix.lower() not in (".svg", ".png"):

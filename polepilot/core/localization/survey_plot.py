@@ -44,11 +44,12 @@ def plot_survey(survey: Survey, site: Site | None = None) -> Chart:
     for pole in survey.poles:
         _draw_pole(chart, sheet, pole, factor)
     enlarged = f", drawn {factor} times as large" if factor > 1 else ""
+    measured = any(pole.measured is not None for pole in survey.poles)
+    rings = " Rings: where poles were measured." if measured else ""
     chart.text(
         _MARGIN,
         height + _MARGIN / 2 + 46,
-        f"Ellipses hold a pole with 95 %{enlarged}. Blue: the path of the robot. "
-        "Rings: where poles were measured.",
+        f"Ellipses hold a pole with 95 %{enlarged}. Blue: the path of the robot." + rings,
         SOFT,
         12,
     )
@@ -81,7 +82,7 @@ def _draw_pole(chart: Chart, sheet: Field, pole: SurveyedPole, factor: int) -> N
         if pole.wrong:
             chart.line(np.array([(there_x, there_y), (x, y)]), _WRONG, 1.6, dashed=True)
     chart.dot(x, y, color, 3.0)
-    chart.text(x + 8, y - 8, str(pole.id), color, 13)
+    chart.text(x + 12, y - 12, str(pole.id), color, 13)
 
 
 def _stretches(path: Array) -> list[Array]:

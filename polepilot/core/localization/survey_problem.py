@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from polepilot.core.geometry import Point, Pose2D
-from polepilot.core.localization.survey_run import SurveyRun, Track
+from polepilot.core.localization.survey_run import SurveyRun
+from polepilot.core.localization.survey_track import Track
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -120,10 +121,15 @@ class Problem:
         ranges, bearings, _ = self._sighted(state)
         return ranges / self._range_sigma, bearings / self._bearing_sigma
 
-    def off_by(self, state: Array) -> Array:
-        """How far from its pole each sighting puts it, metres."""
-        ranges, bearings, geometry = self._sighted(state)
-        return np.hypot(ranges, bearings * geometry[0])
+    def projected(self, state: Array) -> Array:
+        """Where each sighting puts its pole (N x 2), NaN where it has no range."""
+        nodes, _, distortion = self.unpack(state)
+        at = nodes[self.node]
+        away = np.where(self.ranged, self._range, np.nan) / (1.0 + distortion[RANGE])
+        seen = self._bearing - self._bend @ distortion[PAN:] + at[:, 2]
+        arm = self._forward
+        x = at[:, 0] + arm * np.cos(at[:, 2]) + away * np.cos(seen)
+        return np.column_stack([x, at[:, 1] + arm * np.sin(at[:, 2]) + away * np.sin(seen)])
 
     def _gather(self, run: SurveyRun) -> None:
         slot = {number: index for index, number in enumerate(self.poles)}
@@ -147,10 +153,10 @@ class Problem:
         table = np.array(rows).reshape(-1, 8)
         self.node, self.pole = table[:, 0].astype(np.intp), table[:, 1].astype(np.intp)
         self.picture = table[:, 7].astype(np.intp)
-        self._ranged = np.isfinite(table[:, 2]) & np.isfinite(table[:, 4])
-        self._range = np.where(self._ranged, table[:, 2], 1.0)
+        self.ranged = np.isfinite(table[:, 2]) & np.isfinite(table[:, 4])
+        self._range = np.where(self.ranged, table[:, 2], 1.0)
         self._bearing = table[:, 3]
-        self._own_range = np.where(self._ranged, table[:, 4], 1.0)
+        self._own_range = np.where(self.ranged, table[:, 4], 1.0)
         self._own_bearing = table[:, 5]
         unit = np.clip(table[:, 6] / run.pan_range, -1.0, 1.0)
         self._bend = np.polynomial.legendre.legvander(unit, PAN_TERMS - 1)
@@ -177,7 +183,7 @@ class Problem:
         away_y = poles[self.pole, 1] - at[:, 1] - arm_y
         distance = np.maximum(np.hypot(away_x, away_y), 1e-3)
         ux, uy = away_x / distance, away_y / distance
-        ranges = np.where(self._ranged, self._range - distance * (1.0 + distortion[RANGE]), 0.0)
+        ranges = np.where(self.ranged, self._range - distance * (1.0 + distortion[RANGE]), 0.0)
         seen = self._bearing - self._bend @ distortion[PAN:]
         bearings = _wrapped(seen - np.arctan2(uy, ux) + at[:, 2])
         return ranges, bearings, (distance, ux, uy, arm_x, arm_y)
@@ -228,7 +234,7 @@ class Problem:
     def _sighting_parts(self, state: Array, derive: bool) -> list[tuple[Array, list[_Derivative]]]:
         ranges, bearings, geometry = self._sighted(state)
         kept = ~self.rejected
-        by_range = np.where(kept & self._ranged, 1.0 / self._range_sigma, 0.0)
+        by_range = np.where(kept & self.ranged, 1.0 / self._range_sigma, 0.0)
         by_bearing = np.where(kept, 1.0 / self._bearing_sigma, 0.0)
         if not derive:
             return [(ranges * by_range, []), (bearings * by_bearing, [])]

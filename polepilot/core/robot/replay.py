@@ -32,8 +32,10 @@ from polepilot.core.trajectory import format_tum
 See = Callable[[FrameFile], Sequence[Detection]]
 """Reads the landmarks of a picture. Raises ImageError where it is none."""
 
-_CLOCK_JUMP = 1.0
+_CLOCK_JUMP = 0.5
 """Seconds without any sample after which nobody knows how the robot has moved."""
+_AT_REST = 5.0
+"""Seconds after which motors and servo have done what they were told, whatever their lags."""
 _SEARCH = 10.0
 """Pictures so long before a pose was found may have led to it, seconds."""
 _COUNT = math.radians(270) / 1023
@@ -137,14 +139,19 @@ def replay(
     reckoned: tuple[float, Pose2D] | None = None
     result = ReplayResult()
     last = dataset.samples[0].stamp if dataset.samples else 0.0
+    command = Odometry(last, 0.0, 0.0)
     for sample in dataset.samples:
         stamp = sample.stamp
         if stamp - last > _CLOCK_JUMP:
             text = f"Nothing was recorded for {stamp - last:.1f} s: the pose is looked for anew."
             result.events.append(LocalizerEvent(stamp, "clock_jump", text))
-            localizer.refix(text)
+            _forget(localizer, text)
+            for odometry in _stand(command, last, stamp):
+                localizer.add_odometry(odometry)
+                commands.add(odometry)
         last = stamp
         if isinstance(sample, Odometry):
+            command = sample
             localizer.add_odometry(sample)
             commands.add(sample)
             continue
@@ -255,6 +262,24 @@ def write_results(
                 (Path(folder) / name).replace(out / name)
     except OSError as error:
         raise DatasetError(f"{out}: the results cannot be written ({error}).") from error
+
+
+def _forget(localizer: Localizer, why: str) -> None:
+    """Look for the pose anew, from nothing that was seen before."""
+    localizer.refix(why)
+    # The first time, what contradicted the old pose is kept; here that is from before, too.
+    localizer.refix(why)
+    localizer.events()
+
+
+def _stand(told: Odometry, begin: float, end: float) -> list[Odometry]:
+    """What bridges a gap in which nobody knows how the robot moved: standing, then as before.
+
+    The second one is when motors and servo have come to rest: from there on time costs nothing.
+    """
+    rest = begin + _AT_REST
+    stops = [replace(told, stamp=stamp, speed=0.0) for stamp in (begin, rest) if stamp < end]
+    return [*stops, replace(told, stamp=end)]
 
 
 def _look(

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+from recordings.ideal import PARTS, Part
 from recordings.scenario import KINDS, Kind
 from recordings.verdict import Verdict, figures, judge
 
@@ -47,11 +48,12 @@ def campaign(
     keep: Path,
     *,
     measured: bool = False,
+    ideal: Sequence[Part] = (),
     processes: int = 2,
 ) -> dict[str, Any]:
     """Every kind with every seed, judged; figures by kind."""
     jobs = [(kind, seed) for kind in kinds for seed in seeds]
-    work = partial(_one, keep=keep, measured=measured)
+    work = partial(_one, keep=keep, measured=measured, ideal=ideal)
     if processes == 1:
         verdicts = [work(job) for job in jobs]
     else:
@@ -60,8 +62,8 @@ def campaign(
     return {kind: figures([one for one in verdicts if one.kind == kind]) for kind in kinds}
 
 
-def _one(job: tuple[Kind, int], keep: Path, measured: bool) -> Verdict:
-    return judge(*job, keep, measured=measured)
+def _one(job: tuple[Kind, int], keep: Path, measured: bool, ideal: Sequence[Part]) -> Verdict:
+    return judge(*job, keep, measured=measured, ideal=ideal)
 
 
 def missed(result: dict[str, Any], *, target: bool = False) -> list[str]:
@@ -155,6 +157,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1])
     parser.add_argument("--final", action="store_true", help=f"judge by {FINAL}")
     parser.add_argument("--measured", action="store_true", help="detections by lot, no pictures")
+    parser.add_argument(
+        "--ideal", nargs="+", choices=PARTS, default=(), help="likewise, without these faults"
+    )
     parser.add_argument("--json", type=Path, help="file for the figures")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument(
@@ -169,6 +174,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         FINAL if options.final else options.seeds,
         options.cache,
         measured=options.measured,
+        ideal=options.ideal,
         processes=options.processes,
     )
     if options.json is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
@@ -32,20 +32,21 @@ TAIL = 0.03
 """Share of the readings that err twice as much."""
 
 
-def drawn(told: Told, seed: int) -> See:
+def drawn(told: Told, seed: int, ideal: Collection[str] = ()) -> See:
     """Landmarks with errors by lot, which are those that the detector made of our pictures."""
 
     def see(frame: FrameFile) -> list[Detection]:
         rng = np.random.default_rng([seed, round(frame.stamp * 1e4)])
         seen = told.sights[round(frame.stamp, 6)]
-        return [one for sight in seen if (one := _measured(sight, rng)) is not None]
+        return [one for sight in seen if (one := _measured(sight, rng, ideal)) is not None]
 
     return see
 
 
-def _measured(sight: Sight, rng: np.random.Generator) -> Detection | None:
+def _measured(sight: Sight, rng: np.random.Generator, ideal: Collection[str]) -> Detection | None:
     chance = float(rng.random())
     errors = rng.standard_normal(2) * (2.0 if rng.random() < TAIL else 1.0)
+    errors *= ["ranges" not in ideal, "bearings" not in ideal]
     wide = 600 * 0.07 / sight.range
     likely = READ - 0.5 * max(sight.range - FAINT, 0.0) / (FARTHEST - FAINT)
     if not sight.whole or sight.range > FARTHEST or chance > likely or sight.smear > 2.0 * wide:

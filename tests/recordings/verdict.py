@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
+from recordings.ideal import Part, ideal_recording
 from recordings.noticed import drawn, looked
 from recordings.recording import Told, read_told, recording
 from recordings.scenario import Kind
@@ -86,12 +87,26 @@ def judge(
     keep: Path,
     *,
     measured: bool = False,
+    ideal: Collection[Part] = (),
     settings: LocalizerSettings | None = None,
 ) -> Verdict:
-    """One recording, made, replayed and judged."""
-    folder = recording(kind, seed, keep, pictures=not measured)
+    """One recording, made, replayed and judged.
+
+    Args:
+        kind: what happens in it.
+        seed: which one of its kind.
+        keep: folder for recordings.
+        measured: draw the detections by lot, from the detector's errors; no pictures.
+        ideal: faults to take away; these recordings are always ``measured``.
+        settings: of the localizer.
+    """
+    measured = measured or bool(ideal)
+    if ideal:
+        folder = ideal_recording(kind, seed, keep, ideal)
+    else:
+        folder = recording(kind, seed, keep, pictures=not measured)
     dataset, told = read_dataset(folder), read_told(folder)
-    look = drawn(told, seed) if measured else looked(dataset)
+    look = drawn(told, seed, ideal) if measured else looked(dataset)
     spent = 0.0
     seen: dict[float, Sequence[Detection]] = {}
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from html import escape
+from itertools import groupby
 from pathlib import Path
 from typing import Literal
 
@@ -123,7 +124,7 @@ class Chart:
         raise InputError(f"{path}: expected a name that ends in .svg or .png.")
 
     def svg(self) -> str:
-        body = "\n".join(_as_svg(part) for part in self.parts)
+        body = "\n".join(_as_svg(list(parts)) for _, parts in groupby(self.parts, _look))
         return (
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width:g} {self.height:g}" '
             f'width="{self.width:g}" height="{self.height:g}" font-family="{_FONT}" role="img">'
@@ -206,25 +207,38 @@ def steps(low: float, high: float) -> list[float]:
     return [round(n * step, 10) + 0.0 for n in range(first, math.floor(high / step + 1e-9) + 1)]
 
 
-def _as_svg(part: _Line | _Dot | _Text) -> str:
+def _look(part: _Line | _Dot | _Text) -> tuple[object, ...]:
+    """What neighbours in the list of parts have in common if one element can draw them all."""
+    if isinstance(part, _Dot) and not part.hollow:
+        return part.color, part.radius
     if isinstance(part, _Line):
-        path = "M" + "L".join(f"{_n(x)} {_n(y)}" for x, y in part.points)
-        dash = ' stroke-dasharray="6 4"' if part.dashed else ""
+        return part.color, part.width, part.dashed
+    return (id(part),)
+
+
+def _as_svg(parts: list[_Line | _Dot | _Text]) -> str:
+    """Parts of one look as one element."""
+    part = parts[0]
+    if isinstance(part, _Text):
         return (
-            f'<path d="{path}" fill="none" stroke="{part.color}" stroke-width="{part.width:g}" '
-            f'stroke-linejoin="round"{dash}/>'
+            f'<text x="{_n(part.x)}" y="{_n(part.y)}" font-size="{part.size:g}" '
+            f'fill="{part.color}" text-anchor="{part.anchor}">{escape(part.words)}</text>'
+        )
+    if isinstance(part, _Dot) and part.hollow:
+        return (
+            f'<circle cx="{_n(part.x)}" cy="{_n(part.y)}" r="{part.radius:g}" fill="none" '
+            f'stroke="{part.color}" stroke-width="1"/>'
         )
     if isinstance(part, _Dot):
-        look = (
-            f'fill="none" stroke="{part.color}" stroke-width="1"'
-            if part.hollow
-            else f'fill="{part.color}"'
-        )
-        return f'<circle cx="{_n(part.x)}" cy="{_n(part.y)}" r="{part.radius:g}" {look}/>'
-    return (
-        f'<text x="{_n(part.x)}" y="{_n(part.y)}" font-size="{part.size:g}" fill="{part.color}" '
-        f'text-anchor="{part.anchor}">{escape(part.words)}</text>'
-    )
+        # A line of no length with round ends.
+        path = "".join(f"M{_n(p.x)} {_n(p.y)}h0" for p in parts if isinstance(p, _Dot))
+        width, more = 2 * part.radius, ' stroke-linecap="round"'
+    else:
+        lines = [p.points for p in parts if isinstance(p, _Line)]
+        path = "".join("M" + "L".join(f"{_n(x)} {_n(y)}" for x, y in line) for line in lines)
+        width, more = part.width, ' stroke-linejoin="round"'
+        more += ' stroke-dasharray="6 4"' if part.dashed else ""
+    return f'<path d="{path}" fill="none" stroke="{part.color}" stroke-width="{width:g}"{more}/>'
 
 
 def _on_image(image: NDArray[np.uint8], part: _Line | _Dot | _Text) -> None:

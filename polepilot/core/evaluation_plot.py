@@ -52,7 +52,8 @@ def draw(
     if _MEASURED in tracks:
         for x, y in field.at(_inside(field, _thinned(tracks[_MEASURED].poses[:, :2]))):
             chart.dot(x, y, MEASURED)
-    field.line(truth.poses[:, :2], INK, 3.2)
+    for piece in _pieces(field, truth):
+        field.line(piece, INK, 3.2)
     for name, track in tracks.items():
         if name != _MEASURED:
             for piece in _pieces(field, track):

@@ -6,6 +6,7 @@ import type {
   Disc,
   PlanRecord,
   PlanRequest,
+  PrecisionRecord,
   RunDetail,
   RunRecord,
   SiteCheck,
@@ -108,6 +109,10 @@ export const checkSite = (site: Site) => post<SiteCheck>("/sites/check", site);
 export const siteVersions = (id: number) => request<SiteVersion[]>(`/sites/${id}/versions`);
 export const readSiteVersion = (id: number, version: number) =>
   request<SiteRecord>(`/sites/${id}/versions/${version}`);
+
+/** The precision map of a drawing, kept or not; with places for so many more landmarks. */
+export const drawnPrecision = (site: Site, suggest = 0) =>
+  post<PrecisionRecord>("/sites/precision", { site, suggest }, { timeout: 65_000 });
 
 /** Planning a large site takes its time; so may the answer. */
 export const makePlan = (body: PlanRequest, signal?: AbortSignal) =>

@@ -6,6 +6,7 @@ import type { Point } from "../core/geometry";
 import type { Site } from "../core/site";
 import { poseAt, trailOf } from "../core/trail";
 import type { Paper } from "../paint/paper";
+import { paintPrecision, paintSuggestions } from "../paint/precision";
 import { paintMissed, paintPlan, paintUnreachable } from "../paint/plan";
 import * as robot from "../paint/robot";
 import { paintFloor, paintGrid, paintSite } from "../paint/site";
@@ -14,6 +15,7 @@ import { check, selection, site } from "../state/draft";
 import { sketch } from "../state/editor";
 import { location } from "../state/location";
 import { plan } from "../state/plan";
+import { shownPrecision, suggestions } from "../state/precision";
 import * as live from "../state/robot";
 import { moment, run, runSite, shown, track } from "../state/runs";
 
@@ -59,6 +61,7 @@ export function paintGround(paper: Paper): void {
   const { place } = location.value;
   const map = shownSite.value;
   paintFloor(paper, map);
+  if (shownPrecision.value) paintPrecision(paper, shownPrecision.value, map);
   paintGrid(paper);
   const planned = shownPlan.value;
   if (planned) {
@@ -78,6 +81,7 @@ export function paintGround(paper: Paper): void {
 /** The drawing at hand and its problems, above everything. */
 export function paintDrawing(paper: Paper): void {
   if (location.value.place !== "draw") return;
+  if (shownPrecision.value && suggestions.value) paintSuggestions(paper, suggestions.value);
   const at = selection.value;
   if (at && !sketch.value) paintHandles(paper, site.value, at);
   paintProblems(paper, check.value?.problems ?? []);

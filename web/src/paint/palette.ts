@@ -24,9 +24,18 @@ const NAMES = {
   poleEdge: "--pole-edge",
   poleUnseen: "--pole-unseen",
   obstacle: "--obstacle",
+  blind: "--heat-none",
 } as const;
 
-export type Palette = Record<keyof typeof NAMES, string> & { coveredAlpha: number; line: number };
+/** From sharp to vague: one colour more than there are limits between them. */
+const HEAT = [1, 2, 3, 4, 5, 6, 7].map((shade) => `--heat-${shade}`);
+
+export type Palette = Record<keyof typeof NAMES, string> & {
+  coveredAlpha: number;
+  line: number;
+  heat: string[];
+  heatAlpha: number;
+};
 
 let palette: Palette | null = null;
 let version = -1;
@@ -41,6 +50,8 @@ export function currentPalette(): Palette {
     ...(colours as Record<keyof typeof NAMES, string>),
     coveredAlpha: Number(read("--covered-alpha")),
     line: Number(read("--line-scale")),
+    heat: HEAT.map(read),
+    heatAlpha: Number(read("--heat-alpha")),
   };
   return palette;
 }

@@ -5,6 +5,7 @@ import { following, showAll, zoom } from "../map/view";
 import { canRedo, canUndo, dirty, redo, saved, saving, undo } from "../state/draft";
 import { saveDrawing, sketch, take, whole } from "../state/editor";
 import { location } from "../state/location";
+import { toggle, wanted } from "../state/precision";
 import { IconButton } from "../ui/controls";
 
 const TOOLS: { kind: Kind; label: string; key: string }[] = [
@@ -60,6 +61,13 @@ function DrawTools() {
         onClick={saveDrawing}
       />
       <hr />
+      <IconButton
+        icon="precision"
+        label="Precision"
+        hint="How well the robot would know its place (P)"
+        pressed={wanted.value}
+        onClick={toggle}
+      />
     </>
   );
 }

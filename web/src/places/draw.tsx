@@ -27,6 +27,7 @@ import {
   Section,
   TextField,
 } from "../ui/controls";
+import { Precision } from "./precision";
 import { SiteList } from "./sitelist";
 
 /** More corners than this are edited on the map. */
@@ -284,7 +285,9 @@ export function Draw() {
   return (
     <>
       <Problems />
-      {at ? <Selected drawn={drawn} at={at} /> : <Overview drawn={drawn} />}
+      {at && <Selected drawn={drawn} at={at} />}
+      <Precision />
+      {!at && <Overview drawn={drawn} />}
       {!at && <SiteList />}
     </>
   );

@@ -4,6 +4,7 @@ import type { Kind } from "../core/site";
 import { redo, removeSelected, select, selection, undo } from "./draft";
 import { pressKey, saveDrawing, sketch, take } from "./editor";
 import { location } from "./location";
+import { toggle } from "./precision";
 import { stop } from "./robot";
 
 export const TOOL_KEYS: Record<string, Kind> = {
@@ -59,6 +60,10 @@ function handle(event: KeyboardEvent): boolean {
   }
   if (TOOL_KEYS[key]) {
     take(TOOL_KEYS[key]);
+    return true;
+  }
+  if (key === "p") {
+    toggle();
     return true;
   }
   if (key === "v") {

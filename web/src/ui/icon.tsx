@@ -15,6 +15,8 @@ const PATHS = {
   plus: "M12 5v14 M5 12h14",
   minus: "M5 12h14",
   follow: "M12 12m-6 0a6 6 0 1012 0 6 6 0 10-12 0 M12 2v5 M12 17v5 M2 12h5 M17 12h5",
+  precision:
+    "M12 12m-9 0a9 9 0 1018 0 9 9 0 10-18 0 M12 12m-5 0a5 5 0 1010 0 5 5 0 10-10 0 M12 12m-1 0a1 1 0 102 0 1 1 0 10-2 0",
   trash: "M5 7h14 M10 7V4h4v3 M7 7l1 13h8l1-13",
   copy: "M8 8h12v12H8z M4 16V4h12",
   close: "M6 6l12 12 M18 6L6 18",

@@ -1,25 +1,23 @@
 /* Far codes: their segments are so short that runs cannot be told apart. Where a column has colour
- * for a short stretch, all places and sizes of a code are tried on it. */
+ * for a short stretch, all places and sizes of a code are tried on it.
+ *
+ * Colour ignores walls and floors. JPEG and cheap sensors blur it over several rows: what is left
+ * of it says where to look, and the brightness, which they keep sharp, is read. */
 #include "search.h"
 
-#define STRETCH 46         /* rows of colour at most */
+#define LONGEST 54         /* rows of a far code */
 #define GAP 22             /* rows without colour that a stretch may have */
 #define LEAST_SEGMENTS 9   /* rows of colour at least, in the shortest segments */
 #define BESIDE 4           /* rows above and below a stretch that take part */
 #define APART 4            /* columns from the strip's middle to what is beside it, */
 #define LEAK 0.4f          /* of which so much is blurred into it */
-#define NEAR 3.3f          /* rows per segment from which on colour parts the segments well */
-#define ROUGH_REST 0.15f   /* mean square that a code may leave over at whole pixels, of bright - dark, */
-#define MOST_REST 0.06f    /* and at fractions of a pixel */
-#define MOST_SUMS (STRETCH + 2 * BESIDE + 1)
-#define HOPELESS 1e9f      /* the rest of what is no code at all */
-#define LONE 0.75f         /* share of the light that a single bright segment keeps */
-
-/* A place and size of a code, and how well it fits. */
-typedef struct {
-    float rest, top, unit, contrast;
-    int id;
-} fit;
+#define NEAR 3.3f          /* rows per segment from which on runs tell, */
+#define SHARP 4.0f         /* and from which on blurred colour does */
+#define FRAYED 8           /* rows by which a code may be shorter than its stretch of colour, */
+#define HIDDEN 2           /* and by which it may be longer */
+#define ROWS_APART 3       /* every third row is asked for faint colour */
+#define LEAST_DEPTH 5.0f   /* grey levels of a valley */
+#define MOST_SUMS (3 * LONGEST + 32)
 
 /* The running sum of the brightness of three columns, grey levels of one. What is beside them is in
  * part blurred into them: that part of a wall's or floor's pattern is taken off again. */
@@ -47,91 +45,40 @@ static void sum_signal(const uint8_t *signal, int from, int to, float *sum)
         sum[y - from + 1] = sum[y - from] + (float)signal[y];
 }
 
-/* The light of each segment of a code of that place and size, from the running sum over ``rows``;
- * 0 where it goes beyond them. */
-static int read_levels(const float *sum, int rows, float top, float unit, int segments,
-                       float *level)
+/* Whether the light has two valleys, as every code does. */
+static int has_valleys(const float *sum, int rows)
 {
-    float before = 0;
-    for (int k = 0; k <= segments; k++) {
-        float place = top + unit * (float)k;
-        if (place < 0 || place >= (float)rows)
-            return 0;
-        int at = (int)place;
-        float here = sum[at] + (place - (float)at) * (sum[at + 1] - sum[at]);
-        if (k > 0)
-            level[k - 1] = (here - before) / unit;
-        before = here;
-    }
-    return 1;
-}
-
-/* How badly the light fits any code of that place and size: fills in all but these two. */
-static void comb(const float *sum, int rows, int bits, fit *out)
-{
-    int segments = 2 * bits + 5;
-    float level[EYE_MOST_SEGMENTS];
-    out->rest = HOPELESS;
-    if (!read_levels(sum, rows, out->top, out->unit, segments, level))
-        return;
-    float bright = (level[0] + level[1] + level[segments - 2] + level[segments - 1]) / 4;
-    float dark = 0;
-    for (int k = 2; k < segments - 2; k += 2)
-        dark += level[k];
-    dark /= (float)(bits + 1);
-    float step = bright - dark, rest = 0;
-    if (step < EYE_LEAST_STEP)
-        return;
-    out->id = 0;
-    for (int k = 0; k < segments; k++) {
-        int bar = k < 2 || k >= segments - 2, bit = !bar && k % 2 == 1;
-        float off = level[k] - (bar ? bright : dark);
-        if (bit && off > step / 2) {
-            /* A lone bright segment loses light to its neighbours: as bright as it gets. */
-            out->id |= 1 << (k - 3) / 2;
-            off = off > LONE * step ? 0 : off - LONE * step;
+    float top = sum[1] - sum[0], low = top;
+    int valleys = 0, falling = 0;
+    for (int i = 1; i < rows && valleys < 2; i++) {
+        float light = sum[i + 1] - sum[i];
+        if (falling && light - low > LEAST_DEPTH) {
+            valleys++;
+            falling = 0;
+            top = light;
+        } else if (!falling && top - light > LEAST_DEPTH) {
+            falling = 1;
+            low = light;
         }
-        rest += off * off;
+        top = light > top ? light : top;
+        low = light < low ? light : low;
     }
-    out->contrast = step;
-    out->rest = rest / (step * step * (float)segments);
+    return valleys == 2;
 }
 
-/* Tries codes with ``least`` to ``most`` rows per segment whose middle is within ``reach``. */
-static void try_codes(const float *sum, int rows, int bits, float middle, float reach, float least,
-                      float most, float fineness, fit *best)
-{
-    float segments = (float)(2 * bits + 5);
-    for (float unit = least; unit <= most; unit += fineness / segments) {
-        for (float off = -reach; off <= reach; off += fineness) {
-            fit one = {.top = middle + off - unit * segments / 2, .unit = unit};
-            comb(sum, rows, bits, &one);
-            if (one.rest < best->rest)
-                *best = one;
-        }
-    }
-}
-
-/* Tries all places and sizes of a code on the rows from ``top`` to ``bottom`` of one column, of
- * which ``height`` from ``from`` on have colour; returns how many codes were found. */
-static int match_stretch(eye_hits *hits, const float *sum, int top, int bottom, int from,
-                         int height, int x)
+/* Tries all places and sizes of a code on the running sum from row ``top`` to ``bottom`` of a
+ * column, of which those from ``from`` to ``end`` have colour; returns how many codes were found. */
+static int match_stretch(eye_hits *hits, const float *sum, int top, int bottom, int from, int end,
+                         int longest, int x)
 {
     int found = 0;
     for (int b = 0; b < hits->n_bits && hits->n_hits < EYE_MOST_HITS; b++) {
         int bits = hits->bits[b];
-        float segments = (float)(2 * bits + 5), middle = (float)(from - top) + (float)height / 2;
-        float least = ((float)height - 8) / segments, most = ((float)height + 2) / segments;
-        fit best = {.rest = ROUGH_REST};
-        least = least < EYE_SHORTEST ? EYE_SHORTEST : least;
-        try_codes(sum, bottom - top, bits, middle, 1.5f + 0.3f * most, least, most, 1.0f, &best);
-        if (best.rest >= ROUGH_REST)
-            continue;
-        middle = best.top + best.unit * segments / 2;
-        float apart = 0.75f / segments;
-        try_codes(sum, bottom - top, bits, middle, 0.5f, best.unit - apart, best.unit + apart,
-                  0.25f, &best);
-        if (best.rest >= MOST_REST || best.id == 0)
+        float segments = (float)(2 * bits + 5);
+        float least = (float)(end - from + 1 - FRAYED) / segments, most = (float)longest / segments;
+        eye_slid best;
+        if (!eye_slide(sum, bottom - top, bits, least, most > SHARP ? SHARP : most, from - top,
+                       end - top, &best))
             continue;
         float begin = best.top + 2 * best.unit + (float)top - 0.5f;
         hits->hits[hits->n_hits++] = (eye_hit){
@@ -174,16 +121,41 @@ void eye_match_comb(eye_hits *hits, const uint8_t *signal, int first, int last, 
                 peak = signal[y] > peak ? signal[y] : peak;
             }
         int height = end - from + 1;
-        if (from > last || height > STRETCH || (float)height < LEAST_SEGMENTS * EYE_SHORTEST ||
+        if (from > last || height > LONGEST || (float)height < LEAST_SEGMENTS * EYE_SHORTEST ||
             peak < 2 * EYE_LEAST_STEP || is_known(hits, known, from, end))
             continue;
         int top = from < BESIDE ? 0 : from - BESIDE;
         int bottom = end + BESIDE + 1 < rows ? end + BESIDE + 1 : rows;
-        /* Colour ignores walls and floors; brightness is sharper in pictures that were JPEG. */
         sum_signal(signal, top, bottom, sum);
-        if (match_stretch(hits, sum, top, bottom, from, height, x))
+        if (match_stretch(hits, sum, top, bottom, from, end, height + HIDDEN, x))
             continue;
         sum_brightness(hits, x, top, bottom, sum);
-        match_stretch(hits, sum, top, bottom, from, height, x);
+        match_stretch(hits, sum, top, bottom, from, end, height + HIDDEN, x);
+    }
+}
+
+/* Codes in column ``x`` that have hardly any colour left, somewhere: by their brightness. */
+void eye_match_faint(eye_hits *hits, int x)
+{
+    const eye_picture *p = hits->picture;
+    const uint8_t *column = p->pixels + (ptrdiff_t)p->channels * x;
+    float sum[MOST_SUMS];
+    int y = 0;
+    while (y < p->rows) {
+        while (y < p->rows && eye_colour(column + y * p->stride, hits->task) <= EYE_FAINT)
+            y += ROWS_APART;
+        int from = y, end = y;
+        for (; y < p->rows && y - end <= GAP; y += ROWS_APART)
+            if (eye_colour(column + y * p->stride, hits->task) > EYE_FAINT)
+                end = y;
+        int height = end - from + 1;
+        if (from >= p->rows || height > LONGEST || is_known(hits, 0, from, end))
+            continue;
+        int room = LONGEST - height + BESIDE;
+        int top = from < room ? 0 : from - room;
+        int bottom = end + room + 1 < p->rows ? end + room + 1 : p->rows;
+        sum_brightness(hits, x, top, bottom, sum);
+        if (has_valleys(sum, bottom - top))
+            match_stretch(hits, sum, top, bottom, from, end, LONGEST, x);
     }
 }

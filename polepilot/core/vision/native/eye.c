@@ -2,7 +2,6 @@
 #include "internal.h"
 
 #include <math.h>
-#include <string.h>
 
 #define LEAST_ROWS 8           /* of a picture; no code has fewer */
 #define ATTEMPTS 2
@@ -15,7 +14,9 @@
 #define USUAL_TINT 0.17        /* as in eye_strip */
 #define USUAL_SIGMA 0.0040      /* of the unit, as a share of it */
 #define SURE 6e-4              /* share of the unit: no second fit makes it better */
-#define FEW_ROWS 6.0           /* per segment: JPEG blurs colour by up to as much */
+#define SHARP 3.3              /* rows per segment: blurred colour still parts them */
+#define FAR 4.0                /* rows per segment: */
+#define MISFIT_A_FAR_BIT 7.0   /* what a further bright bit allows to a code with fewer */
 #define MOST_BLUR 0.5          /* rows, and three tenths of a segment */
 #define SHORTEST 1.25          /* rows per segment */
 
@@ -57,10 +58,13 @@ static double misfit(const eye_strip *strip, double constant)
 
 static double most_misfit(const eye_strip *strip)
 {
-    double most = MOST_MISFIT - MISFIT_A_BIT;
+    int ones = 0;
     for (int bit = 0; bit < strip->bits; bit++)
-        most += strip->id >> bit & 1 ? MISFIT_A_BIT : 0;
-    return most;
+        ones += strip->id >> bit & 1;
+    /* A code without a gap is a fence: many things are striped evenly. */
+    int fence = ones == strip->bits;
+    double more = strip->unit < FAR && !fence ? MISFIT_A_FAR_BIT : MISFIT_A_BIT;
+    return MOST_MISFIT + more * (ones - 1);
 }
 
 /* What is known as soon as there is a scale. */
@@ -103,26 +107,23 @@ static int read_strip(const eye_task *task, const eye_candidate *candidate,
 
 /* Straightens, fits and reads a candidate; the reason where it is no code. */
 static int read_candidate(const eye_picture *picture, const eye_task *task,
-                          const eye_candidate *candidate, double thick, eye_upright *upright,
-                          eye_scale *scale, double levels[][3], eye_strip *out)
+                          const eye_candidate *candidate, double thick, int sharp,
+                          eye_upright *upright, eye_scale *scale, double levels[][3],
+                          eye_strip *out)
 {
     int id = candidate->id, before = 0, reason = EYE_NO_CODE, coloured = picture->channels == 3;
-    /* A segment misread at whole pixels shows in the levels: look again with what they say. Where
-     * the brightest channel is too blurred to be read the brightness may be sharp enough. */
     for (int attempt = 0; attempt < ATTEMPTS && reason != EYE_READ && id != before; attempt++) {
         char code[EYE_CODE_SIZE];
         eye_encode(id, candidate->bits, code);
-        reason = eye_straighten(picture, task, candidate, code, thick, upright);
+        reason = eye_straighten(picture, task, candidate, code, thick, sharp, upright);
         if (reason != EYE_READ)
             return reason;
         out->column = upright->column;
         out->lean = upright->lean;
         before = id;
-        reason = read_strip(task, candidate, upright, thick, 0, &id, scale, levels, out);
-        if (reason == EYE_READ && coloured && scale->unit_sigma > SURE)
+        reason = read_strip(task, candidate, upright, thick, sharp, &id, scale, levels, out);
+        if (reason == EYE_READ && coloured && !sharp && scale->unit_sigma > SURE)
             eye_refine_scale(upright, task, out->code, candidate, scale);
-        else if (reason != EYE_READ && id == before && coloured && out->unit < FEW_ROWS)
-            reason = read_strip(task, candidate, upright, thick, 1, &id, scale, levels, out);
     }
     if (reason != EYE_READ)
         return reason;
@@ -133,7 +134,7 @@ static int read_candidate(const eye_picture *picture, const eye_task *task,
 
 /* Looks closely at a candidate; the reason where it is no landmark. */
 static int examine(const eye_picture *picture, const eye_task *task,
-                   const eye_candidate *candidate, eye_strip *out)
+                   const eye_candidate *candidate, int sharp, eye_strip *out)
 {
     int segments = 2 * candidate->bits + 5;
     double thick = thickest(task, candidate->bits);
@@ -148,7 +149,7 @@ static int examine(const eye_picture *picture, const eye_task *task,
     out->width = thick * out->unit;
     eye_encode(candidate->id, candidate->bits, out->code);
     int reason =
-        read_candidate(picture, task, candidate, thick, &upright, &scale, levels, out);
+        read_candidate(picture, task, candidate, thick, sharp, &upright, &scale, levels, out);
     if (reason != EYE_READ)
         return reason;
     if (scale.unit < SHORTEST || scale.blur > MOST_BLUR + 0.3 * scale.unit)
@@ -174,6 +175,20 @@ static int examine(const eye_picture *picture, const eye_task *task,
     return misfit(out, task->constant) > most_misfit(out) ? EYE_POOR_FIT : EYE_READ;
 }
 
+/* Examines a candidate by its colour and, if that is of no use on a far one, by its brightness: JPEG
+ * and cheap sensors blur colour over as many rows as a segment has. */
+static eye_strip look_closely(const eye_picture *picture, const eye_task *task,
+                              const eye_candidate *candidate)
+{
+    eye_strip strip = {0}, other = {0};
+    double unit = (candidate->bottom - candidate->top) / (2 * candidate->bits + 1);
+    strip.reason = examine(picture, task, candidate, 0, &strip);
+    if (strip.reason == EYE_READ || picture->channels == 1 || unit >= SHARP)
+        return strip;
+    other.reason = examine(picture, task, candidate, 1, &other);
+    return other.reason == EYE_READ ? other : strip;
+}
+
 int32_t eye_look(const eye_picture *picture, const eye_task *task, eye_strip *strips,
                  int32_t capacity)
 {
@@ -184,9 +199,7 @@ int32_t eye_look(const eye_picture *picture, const eye_task *task, eye_strip *st
     if (n < 0)
         return -1;
     n = n > capacity ? capacity : n;
-    for (int i = 0; i < n; i++) {
-        memset(strips + i, 0, sizeof *strips);
-        strips[i].reason = examine(picture, task, candidates + i, strips + i);
-    }
+    for (int i = 0; i < n; i++)
+        strips[i] = look_closely(picture, task, candidates + i);
     return n;
 }

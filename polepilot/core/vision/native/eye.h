@@ -5,7 +5,8 @@
  *   search.c   which columns to look at, with
  *     runs.c     the bright runs of a column
  *     match.c    runs with the proportions of a code: near landmarks
- *     comb.c     codes too far for runs
+ *     comb.c     codes too far for runs, with
+ *     slide.c    codes laid along the light of a column
  *     gather.c   columns that agree
  *   upright.c  how the strip leans; its light by row, straightened, and by column
  *   scale.c    all edges of the code at once, fitted to one scale, by the model in wave.c

@@ -58,7 +58,7 @@ typedef struct {
 /* Each says in its file what it does; those that return a reason return one of enum eye_reason. */
 int eye_search(const eye_picture *picture, const eye_task *task, eye_candidate *found);
 int eye_straighten(const eye_picture *picture, const eye_task *task,
-                   const eye_candidate *candidate, const char *code, double aspect,
+                   const eye_candidate *candidate, const char *code, double aspect, int sharp,
                    eye_upright *out);
 int eye_fit_scale(const eye_upright *upright, const eye_task *task, const char *code,
                   const eye_candidate *candidate, int sharp, eye_scale *out);

@@ -17,6 +17,7 @@
 typedef struct {
     int first, last, count; /* rows, both included; how many have it */
     int strong;             /* whether any has much */
+    int faint;              /* rows that have at least a little */
 } extent;
 
 /* Asks every third row of every second column whether it has colour. */
@@ -24,16 +25,19 @@ static void survey(const eye_picture *p, const eye_task *task, extent *extents)
 {
     int columns = (p->columns + EYE_APART - 1) / EYE_APART;
     int coloured = eye_is_coloured(p->channels, task);
-    extent whole = {0, p->rows - 1, p->rows, 1}, none = {p->rows, -1, 0, 0};
+    extent whole = {0, p->rows - 1, p->rows, 1, 0}, none = {p->rows, -1, 0, 0, 0};
     for (int c = 0; c < columns; c++)
         extents[c] = coloured ? none : whole;
     for (int y = 0; coloured && y < p->rows; y += ROWS_APART) {
         const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
         for (int c = 0; c < columns; c++) {
             int colour = eye_colour(row + 3 * EYE_APART * c, task);
-            if (colour <= 4 * EYE_FAINTEST)
+            if (colour <= EYE_FAINT)
                 continue;
             extent *e = extents + c;
+            e->faint++;
+            if (colour <= 4 * EYE_FAINTEST)
+                continue;
             e->first = y < e->first ? y : e->first;
             e->last = y;
             e->count++;
@@ -125,6 +129,9 @@ int eye_search(const eye_picture *picture, const eye_task *task, eye_candidate *
         choose_bits(hits);
         survey(picture, task, extents);
         look_at_all(hits, extents, signal);
+        for (size_t c = 0; c < columns; c++)
+            if (extents[c].faint >= LEAST_COLOURED)
+                eye_match_faint(hits, (int)c * EYE_APART);
         n = eye_gather(hits, found);
     }
     free(hits);

@@ -1,4 +1,4 @@
-/* Between the files of the search: runs.c, match.c, comb.c, gather.c, search.c. */
+/* Between the files of the search: runs.c, match.c, comb.c, slide.c, gather.c, search.c. */
 #ifndef POLEPILOT_SEARCH_H
 #define POLEPILOT_SEARCH_H
 
@@ -10,6 +10,8 @@
 #define EYE_LEAST_STEP 12  /* grey levels of signal; less is noise */
 #define EYE_SHORTEST 1.15f /* rows per segment; shorter ones cannot be told apart */
 #define EYE_APART 2        /* every second column is looked at */
+#define EYE_FAINT 32       /* quarters of a grey level of colour; what has less has none */
+#define EYE_BLEEDING 3     /* rows by which colour may go on beyond a code */
 
 /* A bright stretch of one column's signal. */
 typedef struct {
@@ -26,6 +28,14 @@ typedef struct {
     uint8_t contrast;             /* of the dimmest bright segment and the brightest dark one */
 } eye_hit;
 
+/* A code laid along the light of a column, and what it leaves over (`eye_slide`). */
+typedef struct {
+    float top, unit; /* rows: where it begins, and per segment */
+    float rest;      /* mean square, of bright - dark squared */
+    float contrast;  /* grey levels */
+    int id;
+} eye_slid;
+
 /* All of a picture. */
 typedef struct {
     const eye_picture *picture;
@@ -39,6 +49,9 @@ int eye_find_runs(const uint8_t *signal, int rows, eye_run *runs);
 int eye_smooth_runs(const eye_run *runs, int count, eye_run *smooth);
 void eye_match_runs(eye_hits *hits, const eye_run *runs, int count, float column);
 void eye_match_comb(eye_hits *hits, const uint8_t *signal, int first, int last, int x, int known);
+void eye_match_faint(eye_hits *hits, int x);
+int eye_slide(const float *sum, int rows, int bits, float least, float most, int from, int end,
+              eye_slid *best);
 int eye_gather(eye_hits *hits, eye_candidate *found);
 
 #endif

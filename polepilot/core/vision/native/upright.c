@@ -22,6 +22,7 @@
 #define ALL_ROWS 4.0    /* rows per segment up to which each is kept, */
 #define ROWS_A_UNIT 5.0 /* and how many are kept if there are many more */
 #define THIN 3.0        /* half of the columns looked at: nothing is blurred into the midst of more */
+#define OUTSIDE 3
 #define BESIDE 2.0      /* columns from the strip's side to what is beside it */
 
 /* The rows of one run of the code, averaged. */
@@ -34,9 +35,9 @@ typedef struct {
 
 /* Linear light of the paint's colour: grey gives about nothing, whatever its pattern. Of paint that
  * has no colour here, the brightness. */
-static inline float light_of(const uint8_t *pixel, int channels, const eye_task *task)
+static inline float light_of(const uint8_t *pixel, int channels, const eye_task *task, int sharp)
 {
-    if (eye_is_coloured(channels, task))
+    if (!sharp && eye_is_coloured(channels, task))
         return eye_linear(pixel[task->high]) - eye_linear(pixel[task->low]);
     return eye_linear_sixteenths(eye_brightness(pixel, channels, task));
 }
@@ -44,7 +45,7 @@ static inline float light_of(const uint8_t *pixel, int channels, const eye_task 
 /* Light and signal of one band by column, between two rows: the mean of up to ROWS_A_BAND of them,
  * and of ``step`` columns of the picture. */
 static void fill_band(const eye_picture *p, const eye_task *task, double from, double to,
-                      int first, int step, int columns, band *out)
+                      int first, int step, int columns, int sharp, band *out)
 {
     int top = (int)ceil(from), bottom = (int)floor(to);
     if (bottom < top)
@@ -62,8 +63,9 @@ static void fill_band(const eye_picture *p, const eye_task *task, double from, d
         for (int k = 0; k < columns * step; k++) {
             int x = eye_clamp(first + k, 0, p->columns - 1), c = k / step;
             const uint8_t *pixel = row + x * p->channels;
-            out->light[c] += light_of(pixel, p->channels, task);
-            out->signal[c] += (float)eye_signal(pixel, p->channels, task);
+            out->light[c] += light_of(pixel, p->channels, task, sharp);
+            out->signal[c] += sharp ? (float)eye_brightness(pixel, p->channels, task) / 12
+                                    : (float)eye_signal(pixel, p->channels, task);
         }
     }
     for (int c = 0; c < columns; c++) {
@@ -89,9 +91,23 @@ static void cap_signal(band *bands, int n, int columns, int at)
                 bands[b].signal[c] = most;
 }
 
+/* Takes the straight line through both ends off: what is beside the strip is not the paint's. */
+static void level_out(float *values, int n)
+{
+    float left = 0, right = 0;
+    if (n < 4 * OUTSIDE)
+        return;
+    for (int i = 0; i < OUTSIDE; i++) {
+        left += values[i] / OUTSIDE;
+        right += values[n - 1 - i] / OUTSIDE;
+    }
+    for (int i = 0; i < n; i++)
+        values[i] -= left + (right - left) * (float)i / (float)(n - 1);
+}
+
 /* Bright minus dark by column, each band moved back by ``lean``. */
 static void difference(const band *bands, int n, int columns, int step, double row, double lean,
-                       int light, float *out)
+                       int light, int sharp, float *out)
 {
     memset(out, 0, sizeof *out * (size_t)columns);
     for (int b = 0; b < n; b++) {
@@ -110,6 +126,8 @@ static void difference(const band *bands, int n, int columns, int step, double r
         for (int c = to > from ? to : from; c < columns; c++)
             out[c] += weight * of[columns - 1];
     }
+    if (sharp)
+        level_out(out, columns);
 }
 
 static double energy(const float *values, int n)
@@ -123,7 +141,7 @@ static double energy(const float *values, int n)
 
 /* The lean under which the difference stands out most. */
 static double find_lean(const band *bands, int n, int columns, int step, double row, double length,
-                        double wide)
+                        double wide, int sharp)
 {
     float values[EYE_MOST_COLUMNS];
     double best = -1, best_lean = 0;
@@ -133,7 +151,7 @@ static double find_lean(const band *bands, int n, int columns, int step, double 
         reach = MOST_LEANS;
     for (int i = -reach; i <= reach; i++) {
         double lean = i * apart;
-        difference(bands, n, columns, step, row, lean, 0, values);
+        difference(bands, n, columns, step, row, lean, 0, sharp, values);
         double e = energy(values, columns);
         if (e > best) {
             best = e;
@@ -144,7 +162,7 @@ static double find_lean(const band *bands, int n, int columns, int step, double 
         /* A parabola through three energies has its top at the best lean. */
         double e[3];
         for (int i = 0; i < 3; i++) {
-            difference(bands, n, columns, step, row, best_lean + (i - 1) * apart, 0, values);
+            difference(bands, n, columns, step, row, best_lean + (i - 1) * apart, 0, sharp, values);
             e[i] = energy(values, columns);
         }
         double bend = e[0] - 2 * e[1] + e[2];
@@ -158,7 +176,7 @@ static double find_lean(const band *bands, int n, int columns, int step, double 
 /* Rows well inside every run of the code, as bands with the weights of bright - dark. */
 static int fill_bands(const eye_picture *p, const eye_task *task, const eye_candidate *c,
                       const char *code, int segments, double unit, int first, int step,
-                      int columns, band *bands)
+                      int columns, int sharp, band *bands)
 {
     /* Kept off the edges, but for the middle row at least. */
     double trim = eye_limit(0.5 * unit - 0.52, 0, 0.2 * unit + 0.6);
@@ -169,7 +187,7 @@ static int fill_bands(const eye_picture *p, const eye_task *task, const eye_cand
             end++;
         int bright = code[i] == '1', bar = i == 1 || end == segments - 1;
         double from = c->top + (i - 2) * unit, to = c->top + (end - 2) * unit;
-        fill_band(p, task, from + trim, to - trim, first, step, columns, bands + n);
+        fill_band(p, task, from + trim, to - trim, first, step, columns, sharp, bands + n);
         bands[n].weight = bright ? (bar ? 1 : 2) : -2;
         ones += bright && !bar;
         n++;
@@ -286,7 +304,7 @@ static int find_middle(const eye_upright *u, double wide, double *middle)
 
 /* Sets a candidate upright; the reason where that cannot be. ``aspect``: thickness in segments. */
 int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candidate *c,
-                   const char *code, double aspect, eye_upright *out)
+                   const char *code, double aspect, int sharp, eye_upright *out)
 {
     int segments = 2 * c->bits + 5;
     double unit = (c->bottom - c->top) / (segments - 4), wide = aspect * unit;
@@ -301,13 +319,13 @@ int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candida
     int columns = (int)(2 * reach / step) + 2;
     columns = columns > EYE_MOST_COLUMNS ? EYE_MOST_COLUMNS : columns;
     band bands[2 * EYE_MOST_BITS + 4];
-    int n = fill_bands(p, task, c, code, segments, unit, first, step, columns, bands);
+    int n = fill_bands(p, task, c, code, segments, unit, first, step, columns, sharp, bands);
     double across_first = first + (step - 1) / 2.0;
     cap_signal(bands, n, columns, (int)lround((c->column - across_first) / step));
-    double lean = find_lean(bands, n, columns, step, row, length, wide > 2 ? wide : 2);
+    double lean = find_lean(bands, n, columns, step, row, length, wide > 2 ? wide : 2, sharp);
     if (fabs(lean) > STEEPEST)
         return EYE_LEANS;
-    difference(bands, n, columns, step, row, lean, 0, out->across);
+    difference(bands, n, columns, step, row, lean, 0, sharp, out->across);
     for (int i = 0; i < columns; i++)
         if (first + i * step < 0 || first + (i + 1) * step > p->columns)
             out->across[i] = 0; /* beyond the picture */
@@ -318,7 +336,7 @@ int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candida
     out->across_first = across_first;
     if (!find_middle(out, wide, &out->column))
         return EYE_NO_CONTRAST;
-    difference(bands, n, columns, step, row, lean, 1, out->across);
+    difference(bands, n, columns, step, row, lean, 1, sharp, out->across);
     out->half_window = fmax(LOOKED_AT * wide / 2, LEAST_LOOKED_AT);
     fill_profile(p, task, c->top - 2 * unit, c->bottom + 2 * unit, unit, out);
     return EYE_READ;

@@ -33,6 +33,8 @@ class Sighted:
 
     stamp: float
     measurements: tuple[RangeBearing, ...]
+    pan: float | None = None
+    """Where the camera pointed, where that is known."""
 
 
 Sample = Odometry | PanReading | FrameFile | Sighted

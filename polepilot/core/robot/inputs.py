@@ -50,10 +50,14 @@ class Inputs:
         self._add(odometry.stamp, lambda recorder: recorder.odometry(odometry, pan))
 
     def add_sighting(
-        self, stamp: float, measurements: Sequence[RangeBearing], frame: Frame | None
+        self,
+        stamp: float,
+        measurements: Sequence[RangeBearing],
+        frame: Frame | None,
+        pan: float | None = None,
     ) -> None:
         """What one picture gave. The picture itself goes into a log that is being written only."""
-        self._add(stamp, lambda recorder: recorder.sighting(stamp, measurements, None))
+        self._add(stamp, lambda recorder: recorder.sighting(stamp, measurements, None, pan))
         if self._recorder is not None and frame is not None:
             self._recorder.picture(frame)
 

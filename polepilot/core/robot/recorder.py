@@ -136,10 +136,21 @@ class Recorder:
         self._put("odometry", odometry.stamp, document)
 
     def sighting(
-        self, stamp: float, measurements: Sequence[RangeBearing], frame: Frame | None
+        self,
+        stamp: float,
+        measurements: Sequence[RangeBearing],
+        frame: Frame | None,
+        pan: float | None = None,
     ) -> None:
-        """What one picture gave, nothing included, and now and then the picture itself."""
-        document = {"t": _fine(stamp), "measurements": [_measured(m) for m in measurements]}
+        """What one picture gave, nothing included, and now and then the picture itself.
+
+        ``pan``: where the camera pointed; it tells what was not seen, too.
+        """
+        document = {
+            "t": _fine(stamp),
+            "pan": None if pan is None else _fine(pan),
+            "measurements": [_measured(m) for m in measurements],
+        }
         self._put("sighting", stamp, document)
         if frame is not None:
             self.picture(frame)

@@ -153,7 +153,8 @@ def _sighting(fields: Fields) -> Sighted:
                 one.number_or_none("pan") if "pan" in one else None,
             )
         )
-    return Sighted(stamp, tuple(measured))
+    pan = fields.number_or_none("pan") if "pan" in fields else None
+    return Sighted(stamp, tuple(measured), pan)
 
 
 def _triple(fields: Fields, key: str) -> tuple[float, float, float]:

@@ -5,14 +5,14 @@
  * of it says where to look, and the brightness, which they keep sharp, is read. */
 #include "search.h"
 
-#define LONGEST 54         /* rows of a far code */
+#define LONGEST 72         /* rows of a far code */
 #define GAP 22             /* rows without colour that a stretch may have */
 #define LEAST_SEGMENTS 9   /* rows of colour at least, in the shortest segments */
 #define BESIDE 4           /* rows above and below a stretch that take part */
 #define APART 4            /* columns from the strip's middle to what is beside it, */
 #define LEAK 0.4f          /* of which so much is blurred into it */
 #define NEAR 3.3f          /* rows per segment from which on runs tell, */
-#define SHARP 4.0f         /* and from which on blurred colour does */
+#define SHARP 5.5f         /* and from which on blurred colour does */
 #define FRAYED 8           /* rows by which a code may be shorter than its stretch of colour, */
 #define HIDDEN 2           /* and by which it may be longer */
 #define ROWS_APART 3       /* every third row is asked for faint colour */

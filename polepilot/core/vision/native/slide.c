@@ -9,7 +9,8 @@
 #define MOST_REST 0.06f  /* and at quarters of a row */
 #define LONE 0.75f       /* share of the light that a single bright segment keeps */
 #define LEAST_RISE 5.0f  /* grey levels from a fence to the end bar beside it */
-#define FINE 0.25f       /* rows */
+#define COARSE 0.33f     /* of a segment, or a row: by so much differ the lengths that are tried first */
+#define FINE 0.25f       /* rows by which those differ that are tried in the end */
 #define HOPELESS 1e9f    /* the rest of what is no code at all */
 #define MOST_PLACES 96
 
@@ -178,7 +179,7 @@ int eye_slide(const float *sum, int rows, int bits, float least, float most, int
     float segments = (float)(2 * bits + 5);
     *best = (eye_slid){.rest = ROUGH_REST};
     least = least < EYE_SHORTEST ? EYE_SHORTEST : least;
-    for (float unit = least; unit <= most; unit += 1 / segments) {
+    for (float unit = least; unit <= most; unit += fmaxf(1, COARSE * unit) / segments) {
         float length = segments * unit;
         int low = (int)ceilf((float)(end - EYE_BLEEDING) - length), high = from + EYE_BLEEDING;
         low = low < 0 ? 0 : low;

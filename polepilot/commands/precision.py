@@ -107,8 +107,8 @@ def _advice(more: Suggestions) -> list[str]:
     lines += [
         "   (mean error, what has no fix counted as"
         f" {_centimetres(before.limit)}; share of poses with a fix)",
-        f"   No other {len(more.chosen)} of these places give more than"
-        f" {_times(share)} the information, or less than {_centimetres(more.overall_bound)}.",
+        f"   Whichever {len(more.chosen)} of these places are chosen: at most {_times(share)} the"
+        f" information, and no mean error below {_centimetres(more.overall_bound)}.",
     ]
     return lines
 

@@ -94,26 +94,23 @@ def random_poses(site: Site, number: int, rng: np.random.Generator) -> Floats:
 def simulated_fix(site: Site, pose: Pose2D, rng: np.random.Generator) -> Fix | FixRefusal:
     """One sweep of the simulator's camera and what `fix` makes of it.
 
-    Poles stand off their mapped places and pan angles are off, as `FixSettings` has it; the
-    simulator decides what is seen and how well it is measured.
+    The map has the poles a little off their true places, and pan angles are off, as `FixSettings`
+    has it; the simulator decides what is seen and how well it is measured.
     """
     camera, pan = Camera(), PanUnit()
-    moved = [
-        replace(
-            mark,
-            x=mark.x + rng.normal(0, DEFAULT_FIX.survey_sigma),
-            y=mark.y + rng.normal(0, DEFAULT_FIX.survey_sigma),
-        )
+    sigma = DEFAULT_FIX.survey_sigma
+    surveyed = {
+        mark.id: replace(mark, x=mark.x + rng.normal(0, sigma), y=mark.y + rng.normal(0, sigma))
         for mark in site.landmarks
-    ]
+    }
     scenery = Scenery(site.segments())
     axis = camera.pose_on(pose)
     found = []
-    for mark in moved:
+    for mark in site.landmarks:
         angle = min(max(axis.bearing_to(mark.position), pan.minimum), pan.maximum)
         looking = Pose2D(axis.x, axis.y, wrap_angle(axis.heading + angle))
         for _ in range(5):  # the camera passes it in a dozen of pictures
-            seen = sightings(camera, looking, moved, scenery, rng)
+            seen = sightings(camera, looking, site.landmarks, scenery, rng)
             one = next((each for each in seen if each.id == mark.id), None)
             if one is not None:
                 bearing = wrap_angle(angle + one.bearing + rng.normal(0, DEFAULT_FIX.bearing_floor))
@@ -123,7 +120,7 @@ def simulated_fix(site: Site, pose: Pose2D, rng: np.random.Generator) -> Fix | F
                     )
                 )
                 break
-    return fix(found, site.landmarks_by_id(), camera.forward)
+    return fix(found, surveyed, camera.forward)
 
 
 def ratios(site: Site, spots: int, fixes: int, rng: np.random.Generator) -> Floats:

@@ -22,6 +22,7 @@ from polepilot.commands.detect import detect
 from polepilot.commands.evaluate import evaluate
 from polepilot.commands.plan import plan
 from polepilot.commands.precision import precision
+from polepilot.commands.recover import recover
 from polepilot.commands.replay import replay
 from polepilot.commands.serve import serve
 from polepilot.commands.simulate import simulate
@@ -35,7 +36,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for _command in (serve, detect, plan, precision, simulate, replay, evaluate, survey):
+for _command in (serve, detect, plan, precision, simulate, replay, evaluate, recover, survey):
     app.command()(_command)
 app.add_typer(landmarks.app, name="landmarks", help="Print landmarks to scale, choose their ids.")
 app.add_typer(calibrate.app, name="calibrate", help="Camera constant, lens, pan unit.")

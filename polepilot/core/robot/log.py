@@ -60,31 +60,34 @@ def read_messages(path: Path) -> Iterator[tuple[str, int, bytes]]:
         yield from LogReader(path)
 
 
-def finish_log(path: Path) -> bool:
+def finish_log(path: Path, out: Path | None = None) -> int:
     """Give a log that was cut off its end, so that every MCAP reader opens it.
 
-    Returns whether there was anything to keep. The file is replaced in one step.
+    The whole log replaces ``path``, or goes to ``out``, in one step. Returns how many messages
+    there were to keep; with none, nothing is written.
     """
-    whole = path.with_suffix(".mcap.part")
+    target = path if out is None else out
+    whole = target.with_name(f"{target.name}.part")
     count = 0
-    with whole.open("wb") as file:
-        writer = Writer(file, compression=CompressionType.ZSTD)
-        writer.start(profile="", library="polepilot")
-        channels: dict[str, int] = {}
-        for channel, stamp, data in read_messages(path):
-            if channel not in channels:
-                schema = writer.register_schema(channel, "jsonschema", b'{"type":"object"}')
-                channels[channel] = writer.register_channel(channel, "json", schema)
-            writer.add_message(channels[channel], stamp, data, stamp)
-            count += 1
-        writer.finish()  # type: ignore[no-untyped-call]
-        file.flush()
-        os.fsync(file.fileno())
-    if count:
-        whole.replace(path)
-    else:
-        whole.unlink()
-    return count > 0
+    try:
+        with whole.open("wb") as file:
+            writer = Writer(file, compression=CompressionType.ZSTD)
+            writer.start(profile="", library="polepilot")
+            channels: dict[str, int] = {}
+            for channel, stamp, data in read_messages(path):
+                if channel not in channels:
+                    schema = writer.register_schema(channel, "jsonschema", b'{"type":"object"}')
+                    channels[channel] = writer.register_channel(channel, "json", schema)
+                writer.add_message(channels[channel], stamp, data, stamp)
+                count += 1
+            writer.finish()  # type: ignore[no-untyped-call]
+            file.flush()
+            os.fsync(file.fileno())
+        if count:
+            whole.replace(target)
+    finally:
+        whole.unlink(missing_ok=True)
+    return count
 
 
 def _words(error: Exception) -> str:

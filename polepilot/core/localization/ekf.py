@@ -1,17 +1,19 @@
-"""Extended Kalman filter on the pose and on what distorts odometry and measurements.
+"""Extended Kalman filter on the pose and on what distorts odometry, measurements and map.
 
-Twelve states: x, y, heading; the relative error of the speed; the steering's offset; the errors of
-the servo's and the motors' time constants; the relative error of ranges; and four Legendre
-coefficients of the potentiometer's error over the pan range. The last nine change slowly or never;
-estimating them is what brings the error from decimetres to centimetres (the paper's one-landmark
-correction never corrects the heading).
+The states: x, y, heading; the relative error of the speed; the steering's offset; the errors of
+the servo's and the motors' time constants; the relative error of ranges; Legendre coefficients of
+the potentiometer's error over the pan range; and, for as many landmarks as `track_survey` was told,
+the error of their mapped positions. All but the pose change slowly or never. Estimating them is
+what brings the error from decimetres to centimetres (the paper's one-landmark correction never
+corrects the heading); the map's errors repeat in every sighting of a landmark, and a filter that
+took them for noise would become too sure of itself.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from operator import mul
 from typing import NamedTuple
 
 import numpy as np
@@ -19,54 +21,23 @@ from numpy.typing import NDArray
 
 from polepilot.core.geometry import Pose2D, wrap_angle
 from polepilot.core.landmark import Landmark
-from polepilot.core.localization.odometry import OdometryHistory, Step, advance_with_jacobians
+from polepilot.core.localization.fix import Fix
+from polepilot.core.localization.noise import NoiseModel
+from polepilot.core.localization.odometry import OdometryHistory, Step
+from polepilot.core.localization.stretch import Distortions, drive
 from polepilot.core.observation import RangeBearing
 
 Array = NDArray[np.float64]
 
 _WIDE = (0.3, 0.3, math.radians(8.0))
 """Standard deviations before the sightings of a fix are taken in, metres and radians."""
+_NO_RANGE = 1e6
+"""Variance of a range that was not measured, m²."""
 
-STATES = 12
 SPEED, STEERING, SERVO_LAG, MOTOR_LAG, RANGE, PAN = 3, 4, 5, 6, 7, 8
-
-
-@dataclass(frozen=True, slots=True)
-class NoiseModel:
-    """What is believed before the first measurement, and how fast it may change. SI units.
-
-    ``*_prior`` are standard deviations at the start, ``*_walk`` per square root of a second,
-    ``*_noise`` densities of white noise on the inputs (per square root of a hertz).
-    """
-
-    speed_prior: float = 0.04
-    speed_walk: float = 0.002
-    speed_noise: float = 0.03
-    steering_prior: float = math.radians(1.5)
-    steering_walk: float = math.radians(0.02)
-    steering_noise: float = math.radians(0.3)
-    servo_lag_prior: float = 0.06
-    motor_lag_prior: float = 0.05
-    servo_doubt: float = 0.1
-    """Error of the modelled wheel angle while the servo is on its way, as a share of that way."""
-    motor_doubt: float = 0.2
-    """The same for the motors on their way to another speed."""
-    skid: float = 0.004
-    """Unmodelled motion in any direction, metres per square root of a metre driven."""
-    range_prior: float = 0.005
-    pan_priors: tuple[float, float, float, float] = tuple(  # type: ignore[assignment]
-        math.radians(a) for a in (0.3, 0.6, 0.4, 0.6)
-    )
-    pan_range: float = math.radians(135)
-    """Half of the pan range; the Legendre polynomials live on it."""
-    range_floor: float = 0.006
-    """Added to every range's error: landmarks are surveyed to a few millimetres."""
-    bearing_floor: float = math.radians(0.20)
-    """Added to every bearing's error: quantization, and what four coefficients do not describe."""
-    survey_sigma: float = 0.005
-    position_limit: float = 0.004
-    """No standard deviation of x or y is ever believed to be smaller: the map is not better."""
-    heading_limit: float = math.radians(0.08)
+PANS = 6
+STATES = PAN + PANS
+"""States besides the map's errors."""
 
 
 class Innovation(NamedTuple):
@@ -80,11 +51,11 @@ class Innovation(NamedTuple):
     squared: float
     """Squared Mahalanobis distance."""
     jacobian: Array
-    """2 x 12."""
-    spread: Array
-    """2 x 2 covariance of the innovation, inverted."""
+    """2 x states."""
+    spread: tuple[float, float, float]
+    """The innovation's covariance: of the range, of both, of the bearing."""
     cross: Array
-    """12 x 2, P Hᵀ."""
+    """states x 2, P Hᵀ."""
 
     @property
     def metres(self) -> float:
@@ -92,29 +63,40 @@ class Innovation(NamedTuple):
         return math.hypot(self.range_gap, self.distance * self.bearing_gap)
 
 
-@dataclass(slots=True)
 class PoseFilter:
-    """The filter's state; all methods take a few tens of microseconds."""
+    """The filter's state. A prediction or an update takes a few tens of microseconds."""
 
-    wheelbase: float
-    camera_forward: float
-    noise: NoiseModel = field(default_factory=NoiseModel)
-    gate: float = 16.0
-    """Squared Mahalanobis distance beyond which a measurement is not taken."""
-    state: Array = field(default_factory=lambda: np.zeros(STATES))
-    covariance: Array = field(default_factory=lambda: np.eye(STATES))
+    def __init__(
+        self,
+        wheelbase: float,
+        camera_forward: float,
+        noise: NoiseModel | None = None,
+        gate: float = 16.0,
+        surveyed: Sequence[int] = (),
+    ) -> None:
+        """``surveyed``: the landmarks whose positions' errors are states.
 
-    def __post_init__(self) -> None:
-        noise = self.noise
+        ``gate``: squared Mahalanobis distance beyond which a measurement is not taken.
+        """
+        self.wheelbase = wheelbase
+        self.camera_forward = camera_forward
+        self.noise = noise or NoiseModel()
+        self.gate = gate
+        self._places = {number: STATES + 2 * k for k, number in enumerate(surveyed)}
+        size = STATES + 2 * len(surveyed)
+        model = self.noise
         priors = (
-            noise.speed_prior,
-            noise.steering_prior,
-            noise.servo_lag_prior,
-            noise.motor_lag_prior,
-            noise.range_prior,
-            *noise.pan_priors,
+            *(1.0, 1.0, 1.0),
+            model.speed_prior,
+            model.steering_prior,
+            model.servo_lag_prior,
+            model.motor_lag_prior,
+            model.range_prior,
+            *model.pan_priors,
+            *(model.survey_sigma for _ in range(size - STATES)),
         )
-        self.covariance[3:, 3:] = np.diag(np.square(priors))
+        self.state: Array = np.zeros(size)
+        self.covariance: Array = np.diag(np.square(priors))
 
     def reset(self, pose: Pose2D, covariance: Array) -> None:
         """Start again at ``pose`` (3 x 3 covariance). What is known of the robot's errors stays."""
@@ -128,39 +110,18 @@ class PoseFilter:
         self.state[MOTOR_LAG] -= motor
         self.state[SERVO_LAG] -= servo
 
+    def copy(self) -> PoseFilter:
+        other = PoseFilter.__new__(PoseFilter)
+        other.wheelbase, other.camera_forward = self.wheelbase, self.camera_forward
+        other.noise, other.gate = self.noise, self.gate
+        other._places = self._places
+        other.state, other.covariance = self.state.copy(), self.covariance.copy()
+        return other
+
     @property
     def lag_errors(self) -> tuple[float, float]:
         """True time constants of motors and servo minus the history's, seconds."""
         return float(self.state[MOTOR_LAG]), float(self.state[SERVO_LAG])
-
-    def begin(
-        self,
-        pose: Pose2D,
-        stamp: float,
-        sightings: Sequence[tuple[RangeBearing, Landmark]],
-        history: OdometryHistory,
-    ) -> float:
-        """Start at a fix, ``pose`` at ``stamp``, by taking its ``sightings`` in, oldest first.
-
-        The fix serves as the point of linearization only. Its own covariance would not say how
-        its error hangs together with the potentiometer's, and be counted twice.
-        """
-        start = min([stamp, *(sighting.stamp for sighting, _ in sightings)])
-        factor, offset = self.speed_factor, self.steering_offset
-        before = history.advance(pose, stamp, start, factor, offset)
-        self.reset(before, np.diag(np.square(_WIDE)))
-        taken = 0
-        for sighting, landmark in sightings:
-            for step in history.steps(start, sighting.stamp):
-                self.predict(step)
-            start = max(start, sighting.stamp)
-            innovation = self.innovation(sighting, landmark)
-            if innovation.squared <= self.gate:
-                self.update(innovation)
-                taken += 1
-        for step in history.steps(start, stamp):
-            self.predict(step)
-        return taken / max(len(sightings), 1)
 
     @property
     def speed_factor(self) -> float:
@@ -172,105 +133,110 @@ class PoseFilter:
         """True wheel angle minus the reported one, radians."""
         return float(self.state[STEERING])
 
-    def copy(self) -> PoseFilter:
-        other = PoseFilter(self.wheelbase, self.camera_forward, self.noise, self.gate)
-        other.state[:] = self.state
-        other.covariance[:] = self.covariance
-        return other
-
     @property
     def pose(self) -> Pose2D:
-        return Pose2D(float(self.state[0]), float(self.state[1]), wrap_angle(float(self.state[2])))
+        x, y, heading = self.state[:3].tolist()
+        return Pose2D(x, y, wrap_angle(heading))
 
     @property
     def pose_covariance(self) -> Array:
         return self.covariance[:3, :3].copy()
 
-    def predict(self, step: Step) -> None:
-        """Move by one step of odometry. While the robot stands nothing is lost or gained."""
-        if step.speed == 0.0:
-            return
-        state, noise, dt = self.state, self.noise, step.dt
-        speed = step.speed + step.speed_by_lag * float(state[MOTOR_LAG])
-        factor = 1.0 + float(state[SPEED])
-        pose, jacobian = advance_with_jacobians(
-            Pose2D(state[0], state[1], state[2]),
-            speed * factor,
-            step.steering + state[STEERING] + step.by_lag * state[SERVO_LAG],
-            dt,
-            self.wheelbase,
-        )
-        state[:3] = pose
-        raw = jacobian[:, 3]
-        hurried = raw * (noise.motor_doubt * step.unsettled_speed)
-        jacobian = np.column_stack(
-            (
-                jacobian,
-                jacobian[:, 4] * step.by_lag,
-                raw * (factor * step.speed_by_lag),
-            )
-        )
-        jacobian[:, 3] *= speed
-        speed_variance = noise.speed_noise**2 / dt
-        steering_variance = noise.steering_noise**2 / dt + (noise.servo_doubt * step.unsettled) ** 2
-        p = self.covariance
-        moved = jacobian @ p[:7]
-        block = moved[:, :7] @ jacobian.T
-        by_speed, by_steering = jacobian[:, 3], jacobian[:, 4]
-        block += np.outer(by_speed, by_speed) * speed_variance
-        block += np.outer(by_steering, by_steering) * steering_variance
-        if step.unsettled_speed:
-            block += np.outer(hurried, hurried)
-        skid = noise.skid**2 * abs(step.speed) * dt
-        block[0, 0] += skid
-        block[1, 1] += skid
+    def begin(
+        self,
+        found: Fix,
+        stamp: float,
+        sightings: Sequence[tuple[RangeBearing, Landmark]],
+        history: OdometryHistory,
+    ) -> float:
+        """Start at a fix, ``found`` at ``stamp``, by taking its ``sightings`` in, oldest first.
+
+        The fix serves as the point of linearization only. Its own covariance would not say how
+        its error hangs together with the potentiometer's, and be counted twice. Answers which
+        share of the sightings passed the gate.
+        """
+        start = min([stamp, *(sighting.stamp for sighting, _ in sightings)])
+        factor, offset = self.speed_factor, self.steering_offset
+        before = history.advance(found.pose, stamp, start, factor, offset)
+        self.reset(before, np.diag(np.square(_WIDE)))
+        taken = 0
+        for sighting, landmark in sightings:
+            self.predict(history.steps(start, sighting.stamp))
+            start = max(start, sighting.stamp)
+            innovation = self.innovation(sighting, landmark)
+            if innovation.squared <= self.gate:
+                self.update(innovation)
+                taken += 1
+        self.predict(history.steps(start, stamp))
+        return taken / max(len(sightings), 1)
+
+    def predict(self, steps: Iterable[Step]) -> float:
+        """Move by steps of odometry; while the robot stands nothing is lost or gained.
+
+        Returns how many seconds of it the robot moved.
+        """
+        state, noise = self.state, self.noise
+        heading, *wrong = state[2 : MOTOR_LAG + 1].tolist()
+        stretch = drive(heading, steps, Distortions(*wrong), noise, self.wheelbase)
+        if stretch is None:
+            return 0.0
+        state[0] += stretch.dx
+        state[1] += stretch.dy
+        state[2] = wrap_angle(heading + stretch.turn)
+        jacobian, p = stretch.jacobian, self.covariance
+        moved = jacobian @ p[:RANGE]
         p[:3] = moved
         p[:, :3] = moved.T
-        p[:3, :3] = block
-        p[SPEED, SPEED] += noise.speed_walk**2 * dt
-        p[STEERING, STEERING] += noise.steering_walk**2 * dt
+        p[:3, :3] = moved[:, :RANGE] @ jacobian.T + stretch.noise
+        p[SPEED, SPEED] += noise.speed_walk**2 * stretch.moving
+        p[STEERING, STEERING] += noise.steering_walk**2 * stretch.moving
+        return stretch.moving
 
     def innovation(self, measurement: RangeBearing, landmark: Landmark) -> Innovation:
         """Compare a measurement with the state, which must have been predicted to its stamp."""
-        state, noise = self.state, self.noise
-        cos, sin = math.cos(state[2]), math.sin(state[2])
-        arm_x, arm_y = self.camera_forward * cos, self.camera_forward * sin
-        dx, dy = landmark.x - state[0] - arm_x, landmark.y - state[1] - arm_y
+        noise = self.noise
+        place = self._places.get(landmark.id)
+        x, y, heading, _, _, _, _, scale, *bends = self.state[:STATES].tolist()
+        scale += 1.0
+        arm_x = self.camera_forward * math.cos(heading)
+        arm_y = self.camera_forward * math.sin(heading)
+        dx, dy = landmark.x - x - arm_x, landmark.y - y - arm_y
+        if place is not None:
+            shift_x, shift_y = self.state[place : place + 2].tolist()
+            dx, dy = dx + shift_x, dy + shift_y
         distance = max(math.hypot(dx, dy), 1e-3)
         ux, uy = dx / distance, dy / distance
-        jacobian = np.zeros((2, STATES))
-        scale = 1.0 + float(state[RANGE])
-        jacobian[0, 0], jacobian[0, 1] = -ux * scale, -uy * scale
-        jacobian[0, 2] = (ux * arm_y - uy * arm_x) * scale
-        jacobian[0, RANGE] = distance
-        jacobian[1, 0], jacobian[1, 1] = uy / distance, -ux / distance
-        jacobian[1, 2] = -(uy * arm_y + ux * arm_x) / distance - 1.0
+        tx, ty = uy / distance, -ux / distance
         pan = measurement.bearing if measurement.pan is None else measurement.pan
-        u = min(max(pan / noise.pan_range, -1.0), 1.0)
-        legendre = (1.0, u, 1.5 * u * u - 0.5, (2.5 * u * u - 1.5) * u)
-        jacobian[1, PAN:] = legendre
-        pan_error = float(jacobian[1, PAN:] @ state[PAN:])
-        bearing_gap = wrap_angle(measurement.bearing - pan_error - math.atan2(dy, dx) + state[2])
+        shapes = _legendre(min(max(pan / noise.pan_range, -1.0), 1.0))
+        jacobian = np.zeros((2, len(self.state)))
+        jacobian[0, :3] = (-ux * scale, -uy * scale, (ux * arm_y - uy * arm_x) * scale)
+        jacobian[0, RANGE] = distance
+        jacobian[1, :3] = (tx, ty, tx * -arm_y + ty * arm_x - 1.0)
+        jacobian[1, PAN:STATES] = shapes
+        own = 0.0
+        if place is not None:
+            jacobian[0, place : place + 2] = (ux * scale, uy * scale)
+            jacobian[1, place : place + 2] = (-tx, -ty)
+        else:
+            own = noise.survey_sigma**2
+        pan_error = sum(map(mul, shapes, bends))
+        bearing_gap = wrap_angle(measurement.bearing - pan_error - math.atan2(dy, dx) + heading)
         bearing_variance = (
-            measurement.bearing_sigma**2
-            + noise.bearing_floor**2
-            + (noise.survey_sigma / distance) ** 2
+            measurement.bearing_sigma**2 + noise.bearing_floor**2 + own / (distance * distance)
         )
         if math.isfinite(measurement.range) and math.isfinite(measurement.range_sigma):
             range_gap = measurement.range - distance * scale
-            range_variance = measurement.range_sigma**2 + noise.range_floor**2
+            range_variance = measurement.range_sigma**2 + noise.range_floor**2 + own
         else:
-            range_gap, range_variance = 0.0, 1e6
+            range_gap, range_variance = 0.0, _NO_RANGE
         cross = self.covariance @ jacobian.T
-        a = float(jacobian[0] @ cross[:, 0]) + range_variance
-        b = float(jacobian[0] @ cross[:, 1])
-        d = float(jacobian[1] @ cross[:, 1]) + bearing_variance
-        determinant = a * d - b * b
-        inverse = np.array([[d, -b], [-b, a]]) / determinant
-        squared = (
-            d * range_gap**2 - 2.0 * b * range_gap * bearing_gap + a * bearing_gap**2
-        ) / determinant
-        return Innovation(range_gap, bearing_gap, distance, squared, jacobian, inverse, cross)
+        (a, b), (_, d) = (jacobian @ cross).tolist()
+        a, d = a + range_variance, d + bearing_variance
+        squared = (d * range_gap**2 - 2.0 * b * range_gap * bearing_gap + a * bearing_gap**2) / (
+            a * d - b * b
+        )
+        return Innovation(range_gap, bearing_gap, distance, squared, jacobian, (a, b, d), cross)
 
     def take(
         self, measurement: RangeBearing, landmark: Landmark, tolerance: float
@@ -290,21 +256,42 @@ class PoseFilter:
 
     def update(self, innovation: Innovation) -> None:
         """Take a measurement in; ``innovation`` must come from the present state."""
-        gain = innovation.cross @ innovation.spread
-        self.state += gain @ (innovation.range_gap, innovation.bearing_gap)
+        a, b, d = innovation.spread
+        # With S = C Cᵀ, W = P Hᵀ C⁻ᵀ makes of the textbook's P - K S Kᵀ a P - W Wᵀ, which rounding
+        # cannot make lopsided.
+        c = math.sqrt(a)
+        e = b / c
+        f = math.sqrt(d - e * e)
+        gaps = innovation.range_gap / c
+        inverse = np.array(((1.0 / c, -e / (c * f)), (0.0, 1.0 / f)))
+        whitened = innovation.cross @ inverse
+        self.state += whitened @ (gaps, (innovation.bearing_gap - e * gaps) / f)
         self.state[2] = wrap_angle(float(self.state[2]))
         p = self.covariance
-        p -= gain @ innovation.cross.T
-        # Rounding alone may make it lopsided; the mean of both halves stays a covariance.
-        self.covariance = p = 0.5 * (p + p.T)
-        # Sightings repeat the errors of map and potentiometer: a robot that stands and looks for
-        # an hour does not know better where it is.
+        p -= whitened @ whitened.T
+        # Sightings repeat what no state describes: a robot that stands and looks for an hour does
+        # not know better where it is.
         limit = self.noise.position_limit**2
-        p[0, 0] = max(p[0, 0], limit)
-        p[1, 1] = max(p[1, 1], limit)
-        p[2, 2] = max(p[2, 2], self.noise.heading_limit**2)
+        px, py, ph = p[0, 0], p[1, 1], p[2, 2]
+        if px < limit:
+            p[0, 0] = limit
+        if py < limit:
+            p[1, 1] = limit
+        limit = self.noise.heading_limit**2
+        if ph < limit:
+            p[2, 2] = limit
 
     def _doubt(self, factor: float) -> None:
         """Trust the pose less: its standard deviations times ``factor``."""
         self.covariance[:3] *= factor
         self.covariance[:, :3] *= factor
+
+
+def _legendre(u: float) -> list[float]:
+    """The polynomials P0, P1, ... at ``u``, -1 to 1."""
+    before, last = 1.0, u
+    values = [before, last]
+    for degree in range(2, PANS):
+        before, last = last, ((2 * degree - 1) * u * last - (degree - 1) * before) / degree
+        values.append(last)
+    return values

@@ -10,11 +10,14 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from polepilot.core.geometry import Point
+from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.landmark import Landmark
+from polepilot.core.observation import RangeBearing
 
 _SIGHTINGS = 6
 """Contradicting sightings before a landmark is judged."""
+_WITNESSED = 3
+"""The same where another landmark was in its place before and after them."""
 _SPAN = 2.0
 """Seconds between the first and the last of them: more than one pass of the camera."""
 _MEMORY = 60.0
@@ -32,6 +35,26 @@ class Verdict(NamedTuple):
     code: Literal["landmark_moved", "landmark_misread"]
     dx: float
     dy: float
+
+    @property
+    def text(self) -> str:
+        """For a person."""
+        if self.code == "landmark_moved":
+            far = 100 * math.hypot(self.dx, self.dy)
+            return f"Landmark {self.landmark} has been moved by {far:.0f} cm."
+        return f"Landmark {self.landmark} is read where another one stands."
+
+
+def place_of(pose: Pose2D, measurement: RangeBearing, camera_forward: float) -> Point | None:
+    """Where in `map` a landmark appears, seen from ``pose``; None without a range."""
+    if not (math.isfinite(measurement.range) and math.isfinite(measurement.range_sigma)):
+        return None
+    x, y = pose.ahead(camera_forward)
+    direction = pose.heading + measurement.bearing
+    return (
+        x + measurement.range * math.cos(direction),
+        y + measurement.range * math.sin(direction),
+    )
 
 
 @dataclass(slots=True)
@@ -55,6 +78,25 @@ class LandmarkHealth:
             places.popleft()
         if len(places) < _SIGHTINGS or stamp - places[0][0] < _SPAN:
             return None
+        return self._verdict(number)
+
+    def witnessed(self, witness: int) -> list[Verdict]:
+        """``witness`` stands where it should, seen after others that do not.
+
+        The pose was right before they were seen (`contradicted` is told so) and is right after:
+        a few sightings of them are enough.
+        """
+        suspects = [
+            number
+            for number, places in self._places.items()
+            if number != witness and len(places) >= _WITNESSED
+        ]
+        verdicts = [self._verdict(number) for number in suspects]
+        return [verdict for verdict in verdicts if verdict is not None]
+
+    def _verdict(self, number: int) -> Verdict | None:
+        """On what was collected, if that agrees on a new place."""
+        places = self._places[number]
         points = np.array([point for _, point in places])
         middle = np.median(points, axis=0)
         scatter = float(np.median(np.hypot(*(points - middle).T)))

@@ -3,115 +3,51 @@
 FIXING -> TRACKING <-> DEGRADED -> LOST -> (refix) -> FIXING. The filter's state lives at the last
 measurement; the present pose is predicted from there through the odometry that came since, so a
 picture that took 0.3 s to read is applied at the pose from which it was taken.
+
+A pose that is given up is not forgotten at once: until another one is found, landmarks that agree
+with it bring it back. So it costs little to be quick in giving up.
 """
 
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
 from itertools import groupby
-from typing import Literal, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-from polepilot.core.geometry import Point, Pose2D, wrap_angle
+from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.landmark import Landmark
-from polepilot.core.localization.ekf import NoiseModel, PoseFilter
-from polepilot.core.localization.fix import Fix, FixSettings
-from polepilot.core.localization.health import LandmarkHealth
-from polepilot.core.localization.odometry import OdometryHistory, Step
-from polepilot.core.localization.radial import RadialFilter, radial_correction
+from polepilot.core.localization.belief import Belief
+from polepilot.core.localization.doubt import Doubt, largest_sigma
+from polepilot.core.localization.ekf import PoseFilter
+from polepilot.core.localization.events import EventLog
+from polepilot.core.localization.events import LocalizerEvent as LocalizerEvent
+from polepilot.core.localization.fix import Fix
+from polepilot.core.localization.health import LandmarkHealth, Verdict, place_of
+from polepilot.core.localization.noise import NoiseModel as NoiseModel
+from polepilot.core.localization.odometry import OdometryHistory
+from polepilot.core.localization.presence import Presence
+from polepilot.core.localization.radial import RadialFilter, unfiltered
 from polepilot.core.localization.search import FixSearch
+from polepilot.core.localization.settings import LocalizerSettings as LocalizerSettings
+from polepilot.core.localization.settings import Method as Method
+from polepilot.core.localization.track import Filter, Track
 from polepilot.core.observation import Odometry, PoseEstimate, RangeBearing, Status
 from polepilot.core.vehicle import Vehicle
-
-Method = Literal["ekf", "paper"]
 
 _FITTING = 0.7
 """Share of a fix's sightings that the filter must take, or the fix is not believed."""
 _PROBATION = 10.0
 """Seconds that a new pose must last before what was learnt with it outlives it."""
-_LAG_STEP = 0.01
-"""The time constants are followed in steps of this, seconds, and within these limits."""
-_SHORTEST_LAG, _LONGEST_LAG = 0.01, 0.5
-
-
-@dataclass(frozen=True, slots=True)
-class LocalizerSettings:
-    """What the localizer tolerates, and what it believes of the robot. SI units."""
-
-    method: Method = "ekf"
-    tolerance: float = 0.20
-    """A landmark may appear this far from where it should be; beyond it, the pose is in doubt."""
-    gate: float = 16.0
-    """Squared Mahalanobis distance beyond which a measurement is not taken."""
-    degraded_after: float = 2.0
-    """Seconds of motion without a correction."""
-    degraded_sigma: float = 0.10
-    lost_after: float = 12.0
-    lost_sigma: float = 0.25
-    steering_lag: float = 0.10
-    """Time constant of the steering servo, seconds; the EKF learns the true one."""
-    speed_lag: float = 0.04
-    """Time constant of the motors, likewise."""
-    fix: FixSettings = field(default_factory=FixSettings)
-    noise: NoiseModel = field(default_factory=NoiseModel)
-
-
-@dataclass(frozen=True, slots=True)
-class LocalizerEvent:
-    """Something that happened to the pose or to a landmark.
-
-    ``code`` is one of fixed, refixed, degraded, recovered, lost, rejected, landmark_unknown,
-    landmark_moved, landmark_misread, landmark_back, late.
-    """
-
-    stamp: float
-    code: str
-    text: str
-    landmark: int | None = None
-    dx: float | None = None
-    """How far the landmark appears displaced in `map`, metres."""
-    dy: float | None = None
-
-
-class _Filter(Protocol):
-    @property
-    def pose(self) -> Pose2D: ...
-    @property
-    def pose_covariance(self) -> NDArray[np.float64]: ...
-    @property
-    def speed_factor(self) -> float: ...
-    @property
-    def steering_offset(self) -> float: ...
-    def reset(self, pose: Pose2D, covariance: NDArray[np.float64]) -> None: ...
-    def predict(self, step: Step) -> None: ...
-    def take(
-        self, measurement: RangeBearing, landmark: Landmark, tolerance: float
-    ) -> tuple[bool, float]: ...
-    def copy(self) -> _Filter: ...
-
-
-@dataclass(slots=True)
-class _Track:
-    """A filter's state at a moment, and how long the robot has moved since its last correction."""
-
-    filter: _Filter
-    stamp: float
-    moving: float = 0.0
-
-    def predict(self, history: OdometryHistory, stamp: float) -> None:
-        for step in history.steps(self.stamp, stamp):
-            self.filter.predict(step)
-            if step.speed:
-                self.moving += step.dt
-        self.stamp = max(self.stamp, stamp)
-
-    def copy(self) -> _Track:
-        return _Track(self.filter.copy(), self.stamp, self.moving)
+_STANDS_AFTER = 0.2
+"""Seconds after the last motion from when on the robot counts as standing."""
+_SWEEPS = 8.0
+"""Another landmark agreed with the pose recently: within the last two sweeps or so, seconds."""
+_CHANCE = 0.01
+"""How likely it may be that missing landmarks are just overlooked before the pose is given up."""
+_SURVEYED = 16
+"""For so many landmarks the map's error is estimated; for the others it counts as noise."""
+_RESUMING = 2
+"""Sightings that bring a pose back that was given up."""
 
 
 class Localizer:
@@ -123,7 +59,12 @@ class Localizer:
         vehicle: Vehicle,
         camera_forward: float,
         settings: LocalizerSettings | None = None,
+        half_view: float | None = None,
     ) -> None:
+        """``half_view``: half of the camera's horizontal angle of view (rad).
+
+        Where it is known, `add_picture` tells landmarks that are missing.
+        """
         self.settings = settings or LocalizerSettings()
         self._landmarks = dict(landmarks)
         self._camera_forward = camera_forward
@@ -134,35 +75,44 @@ class Localizer:
         )
         self._search = FixSearch(self._landmarks, self._history, camera_forward, self.settings.fix)
         self._health = LandmarkHealth(self._landmarks)
-        self._filter: _Filter
-        if self.settings.method == "paper":
-            self._filter = RadialFilter(vehicle.wheelbase, camera_forward)
-        else:
-            self._filter = PoseFilter(
-                vehicle.wheelbase, camera_forward, self.settings.noise, self.settings.gate
+        self._presence = (
+            None if half_view is None else Presence(self._landmarks, camera_forward, half_view)
+        )
+        self._doubt = Doubt(self.settings.tolerance, self.settings.method == "paper")
+        self._filter: Filter = (
+            RadialFilter(vehicle.wheelbase, camera_forward)
+            if self.settings.method == "paper"
+            else PoseFilter(
+                vehicle.wheelbase,
+                camera_forward,
+                self.settings.noise,
+                self.settings.gate,
+                tuple(self._landmarks)[:_SURVEYED],
             )
-        self._before: tuple[float, _Filter, tuple[float, float]] | None = None
-        self._track: _Track | None = None
-        self._ahead: _Track | None = None
-        self._status = Status.FIXING
-        self._reason = self._search.refusal.reason
+        )
+        """What is known of the robot's errors outlives a pose."""
+        self._before: tuple[float, Filter, tuple[float, float]] | None = None
+        self._track: Track | None = None
+        self._ahead: Track | None = None
+        self._given_up: Track | None = None
+        self._agreeing = 0
         self._measured: tuple[float, Pose2D] | None = None
         self._predicted: tuple[float, Pose2D] | None = None
-        self._against: list[RangeBearing] = []
-        self._gap = 0.0
         self._last_agreed: dict[int, float] = {}
-        self._reported: dict[tuple[str, int], float] = {}
-        self._events: deque[LocalizerEvent] = deque(maxlen=256)
+        self._events = EventLog()
+        self._belief = Belief(self.settings, self._events, reason=self._search.refusal.reason)
         self._fixes = 0
+
+    # ---- what is known -----------------------------------------------------------------------
 
     @property
     def status(self) -> Status:
-        return self._status
+        return self._belief.status
 
     @property
     def reason(self) -> str:
         """Why the status is not TRACKING, for a person; empty while tracking."""
-        return self._reason
+        return self._belief.reason
 
     @property
     def measured(self) -> tuple[float, Pose2D] | None:
@@ -190,32 +140,28 @@ class Localizer:
 
     def events(self) -> list[LocalizerEvent]:
         """What happened since the last call."""
-        drained = list(self._events)
-        self._events.clear()
-        return drained
+        return self._events.drain()
 
-    def refix(self, reason: str) -> None:
-        """Forget the pose and look for it anew; what contradicted the old one is kept."""
-        if self._before is not None and self._track is not None:
-            begun, tracked, lags = self._before
-            if self._track.stamp - begun < _PROBATION:
-                # A pose that did not last was wrong, and so is what was learnt from it.
-                self._filter = tracked
-                self._history.retune(*lags)
-        self._track = self._ahead = self._before = None
-        self._measured = self._predicted = None
-        self._status, self._reason = Status.FIXING, reason
-        self._search.clear()
-        if len(self._landmarks) - len(self._health.moved) < 2:
-            # With so few left, it is as likely that the pose was wrong.
-            self._health.moved.clear()
-        self._collect(self._against)
-        newest = self._against[-1].stamp if self._against else None
-        self._against = []
-        self._last_agreed.clear()
-        self._health.forget()
-        if newest is not None:
-            self._try_fix(newest)
+    def estimate(self, now: float) -> PoseEstimate | None:
+        """The pose at ``now``; None until the first fix. Before the last measurement: that one."""
+        track = self._track
+        if track is None:
+            return None
+        ahead = self._ahead = self._predicted_to(now, track)
+        covariance = ahead.filter.pose_covariance
+        self._judge(ahead)
+        belief = self._belief
+        spread = self._doubt.spread
+        if spread:
+            # Something contradicts the pose and nothing has confirmed it since.
+            covariance[0, 0] += spread**2
+            covariance[1, 1] += spread**2
+            covariance[2, 2] += (spread / 3.0) ** 2
+        return PoseEstimate(
+            ahead.stamp, ahead.filter.pose, covariance, belief.status, belief.reason
+        )
+
+    # ---- what happens ------------------------------------------------------------------------
 
     def add_odometry(self, odometry: Odometry) -> None:
         """How the robot moves from ``odometry.stamp`` on."""
@@ -223,44 +169,64 @@ class Localizer:
         if self._ahead is not None and odometry.stamp < self._ahead.stamp:
             self._ahead = None
 
-    def add_measurements(self, measurements: Sequence[RangeBearing]) -> None:
-        """Landmarks seen; those of one picture share a stamp. At most some 0.3 s late.
+    def add_picture(
+        self, stamp: float, pan: float | None, measurements: Sequence[RangeBearing]
+    ) -> None:
+        """A picture taken at ``stamp`` with the camera turned by ``pan``, and all it showed.
 
-        Measurements older than the newest one that was taken in are left out, as are unknown
-        landmarks; both are reported.
+        Tells more than `add_measurements`: a picture without a landmark that should be in it
+        speaks against the pose.
+        """
+        self.add_measurements(measurements)
+        if self._presence is not None and pan is not None and math.isfinite(stamp):
+            self._look(stamp, pan, {m.landmark for m in measurements})
+
+    def add_measurements(self, measurements: Sequence[RangeBearing]) -> None:
+        """Landmarks seen; those of one picture share a stamp.
+
+        Measurements that come after later ones are applied in their place; those that come too
+        late for that are left out, as are unknown landmarks; both are reported.
         """
         usable = [m for m in measurements if self._usable(m)]
         usable.sort(key=lambda m: m.stamp)
         for stamp, group in groupby(usable, key=lambda m: m.stamp):
             picture = list(group)
             if self._track is None:
-                self._collect(picture)
-                self._try_fix(stamp)
+                self._seek(stamp, picture)
             elif stamp < self._track.stamp - 1e-9:
-                for measurement in picture:
-                    self._report(
-                        stamp, "late", "A measurement came too late.", measurement.landmark
-                    )
+                self._apply_late(self._track, stamp, picture)
             else:
                 self._apply(self._track, stamp, picture)
 
-    def estimate(self, now: float) -> PoseEstimate | None:
-        """The pose at ``now``; None until the first fix. Before the last measurement: that one."""
+    def refix(self, reason: str) -> None:
+        """Give up the pose and look for it anew; what contradicted the old one is kept."""
         track = self._track
-        if track is None:
-            return None
-        ahead = self._ahead
-        if ahead is None or ahead.stamp > now or ahead.stamp < track.stamp:
-            ahead = self._ahead = track.copy()
-        ahead.predict(self._history, now)
-        covariance = ahead.filter.pose_covariance
-        self._judge(ahead.stamp, ahead.moving, _largest_sigma(covariance))
-        if len(self._against) >= 2:
-            # Something contradicts the pose and nothing has confirmed it since.
-            covariance[0, 0] += self._gap**2
-            covariance[1, 1] += self._gap**2
-            covariance[2, 2] += (self._gap / 3.0) ** 2
-        return PoseEstimate(ahead.stamp, ahead.filter.pose, covariance, self._status, self._reason)
+        if self._before is not None and track is not None:
+            begun, tracked, lags = self._before
+            if track.stamp - begun < _PROBATION:
+                # A pose that did not last was wrong, and so is what was learnt from it.
+                self._filter = tracked
+                self._history.retune(*lags)
+                track = None
+        self._given_up, self._agreeing = track, 0
+        self._track = self._ahead = self._before = None
+        self._measured = self._predicted = None
+        self._belief.seek(reason)
+        self._search.clear()
+        if len(self._landmarks) - len(self._health.moved) < 2:
+            # With so few left, it is as likely that the pose was wrong.
+            self._health.moved.clear()
+        against = list(self._doubt.against)
+        self._doubt.clear()
+        self._last_agreed.clear()
+        self._health.forget()
+        if self._presence is not None:
+            self._presence.forget()
+        self._collect(against)
+        if against:
+            self._try_fix(against[-1].stamp)
+
+    # ---- finding the pose --------------------------------------------------------------------
 
     def _usable(self, measurement: RangeBearing) -> bool:
         numbers = (measurement.stamp, measurement.bearing, measurement.bearing_sigma)
@@ -269,8 +235,39 @@ class Localizer:
         if measurement.landmark in self._landmarks:
             return True
         text = f"Landmark {measurement.landmark} is seen but is not on the map."
-        self._report(measurement.stamp, "landmark_unknown", text, measurement.landmark)
+        self._events.report(
+            LocalizerEvent(measurement.stamp, "landmark_unknown", text, measurement.landmark)
+        )
         return False
+
+    def _seek(self, stamp: float, picture: list[RangeBearing]) -> None:
+        """Without a pose: a picture may lead to one, or back to the one that was given up."""
+        if self._given_up is not None and self._resumed(self._given_up, stamp, picture):
+            return
+        self._collect(picture)
+        self._try_fix(stamp)
+
+    def _resumed(self, track: Track, stamp: float, picture: list[RangeBearing]) -> bool:
+        """Whether the pose that was given up is to be believed again."""
+        if stamp < track.stamp - 1e-9:
+            return False
+        track.predict(self._history, stamp)
+        for measurement in picture:
+            if measurement.landmark in self._health.moved:
+                continue
+            mark = self._landmarks[measurement.landmark]
+            taken, gap = track.filter.take(measurement, mark, track.tolerance)
+            if taken:
+                self._agreeing += 1
+            elif gap > self.settings.tolerance:
+                self._agreeing = 0
+        if self._agreeing < _RESUMING:
+            return False
+        track.moving = 0.0
+        self._accept(track, stamp, {m.landmark for m in picture})
+        self._measured = (stamp, track.filter.pose)
+        self._events.add(LocalizerEvent(stamp, "resumed", "The landmarks agree with it again."))
+        return True
 
     def _collect(self, measurements: Sequence[RangeBearing]) -> None:
         """Keep for a fix; landmarks known to have been moved would only mislead it."""
@@ -281,219 +278,202 @@ class Localizer:
     def _try_fix(self, stamp: float) -> None:
         search = self._search
         search.scale, search.offset = self._filter.speed_factor, self._filter.steering_offset
-        found = search.attempt(stamp)
-        if found is None:
-            self._reason = search.refusal.reason
-            return
-        self._begin(stamp, found)
-
-    def _begin(self, stamp: float, found: Fix) -> None:
-        started = self._filter.copy()
-        if isinstance(started, PoseFilter):
-            sightings = [(m, self._landmarks[m.landmark]) for m in self._search.used]
-            share = started.begin(found.pose, stamp, sightings, self._history)
-            sigma = _largest_sigma(started.pose_covariance)
-            if share < _FITTING or sigma > self.settings.degraded_sigma:
-                # The stricter gate left some of them out: they do not fit together so well.
-                self._reason = "The landmarks seen so far do not fit together well enough."
+        for found in search.attempts(stamp):
+            if self._begin(stamp, found):
                 return
-        else:
-            started.reset(found.pose, found.covariance)
+        self._belief.seek(search.refusal.reason)
+
+    def _begin(self, stamp: float, found: Fix) -> bool:
+        """Whether all that was seen fits to the fix so well that it is believed."""
+        started = self._filter.copy()
+        sightings = [(m, self._landmarks[m.landmark]) for m in self._search.used]
+        share = started.begin(found, stamp, sightings, self._history)
+        track = Track(started, stamp, self.settings.tolerance)
+        if share < _FITTING or _sigma(track) > self.settings.degraded_sigma:
+            # The stricter gate left some of them out: they do not fit together so well.
+            self._search.refuse("The landmarks seen so far do not fit together well enough.")
+            return False
         lags = (self._history.speed_lag, self._history.steering_lag)
         self._before = (stamp, self._filter, lags)
-        self._filter = started
-        self._track, self._ahead = _Track(self._filter, stamp), None
+        self._accept(track, stamp, found.landmarks)
         self._measured = (stamp, found.pose)
-        self._status, self._reason = Status.TRACKING, ""
-        self._search.clear()
-        self._against = []
         ids = ", ".join(str(number) for number in found.landmarks)
         code = "refixed" if self._fixes else "fixed"
         self._fixes += 1
-        self._last_agreed = dict.fromkeys(found.landmarks, stamp)
-        self._emit(LocalizerEvent(stamp, code, f"Pose fixed by landmarks {ids}."))
+        self._events.add(LocalizerEvent(stamp, code, f"Pose fixed by landmarks {ids}."))
+        return True
 
-    def _apply(self, track: _Track, stamp: float, picture: list[RangeBearing]) -> None:
-        self._ahead = None
+    def _accept(self, track: Track, stamp: float, agreed: Collection[int]) -> None:
+        """Believe a pose."""
+        self._filter, self._track = track.filter, track
+        self._ahead = self._given_up = None
+        self._belief.accept()
+        self._search.clear()
+        self._doubt.clear()
+        self._last_agreed = dict.fromkeys(agreed, stamp)
+
+    # ---- following it ------------------------------------------------------------------------
+
+    def _apply(self, track: Track, stamp: float, picture: list[RangeBearing]) -> None:
+        ahead, self._ahead = self._ahead, None
+        if ahead is not None and track.stamp <= ahead.stamp <= stamp:
+            track.adopt(ahead)
         track.predict(self._history, stamp)
-        if self._status is Status.LOST:
-            self._against.extend(picture)
-            del self._against[:-200]
+        if self._belief.lost:
+            for measurement in picture:
+                self._doubt.add(measurement, self._doubt.gap)
             return
         predicted = track.filter.pose
         self._predicted = (stamp, predicted)
+        kept = track.keep()
         taken = [m for m in picture if self._take(track, m)]
+        kept += [(m, self._landmarks[m.landmark]) for m in taken]
         ranged = [m for m in taken if math.isfinite(m.range_sigma)]
         if ranged:
             best = min(ranged, key=lambda m: m.range_sigma)
-            self._measured = (stamp, self._unfiltered(predicted, best))
+            self._measured = (
+                stamp,
+                unfiltered(predicted, best, self._landmarks[best.landmark], self._camera_forward),
+            )
         if taken:
             track.moving = 0.0
-            self._against = []
-            self._retune()
-        self._judge_contradictions(stamp)
-        self._judge(stamp, track.moving, _largest_sigma(track.filter.pose_covariance))
+            self._doubt.clear()
+            track.retune(self._history)
+        self._filter = track.filter
+        self._judge_doubt(track)
+        self._judge(track)
 
-    def _retune(self) -> None:
-        """Let the history follow what the filter has learnt of servo and motors."""
-        tracked, history = self._filter, self._history
-        if not isinstance(tracked, PoseFilter) or max(map(abs, tracked.lag_errors)) < _LAG_STEP:
+    def _apply_late(self, track: Track, stamp: float, picture: list[RangeBearing]) -> None:
+        """Go back, take the picture in, and come forward again."""
+        undone = None
+        if not self._belief.lost and stamp >= track.stamp - self.settings.late:
+            undone = track.rewind(stamp, self._history)
+        if undone is None:
+            for measurement in picture:
+                self._events.report(
+                    LocalizerEvent(
+                        stamp, "late", "A measurement came too late.", measurement.landmark
+                    )
+                )
             return
-        before = (history.speed_lag, history.steering_lag)
-        motor, servo = (
-            min(max(lag + error, _SHORTEST_LAG), _LONGEST_LAG)
-            for lag, error in zip(before, tracked.lag_errors, strict=True)
-        )
-        if max(abs(motor - before[0]), abs(servo - before[1])) > 0.5 * _LAG_STEP:
-            history.retune(motor, servo)
-            tracked.retuned(motor - before[0], servo - before[1])
+        self._ahead = None
+        kept = track.keep()
+        taken = [m for m in picture if self._take(track, m)]
+        kept += [(m, self._landmarks[m.landmark]) for m in taken]
+        if taken:
+            track.moving = 0.0
+        track.replay(undone, self._history)
+        self._filter = track.filter
 
-    def _take(self, track: _Track, measurement: RangeBearing) -> bool:
+    def _take(self, track: Track, measurement: RangeBearing) -> bool:
         """Whether a measurement was fused; keeps the books on those that were not."""
         number, stamp = measurement.landmark, measurement.stamp
         mark = self._landmarks[number]
-        settings = self.settings
-        if number in self._health.moved:
-            place = self._place(track.filter.pose, measurement)
+        settings, health = self.settings, self._health
+        if number in health.moved:
+            place = place_of(track.filter.pose, measurement, self._camera_forward)
             if place is None or math.dist(place, mark.position) > 0.5 * settings.tolerance:
-                self._health.contradicted(number, stamp, place or (math.nan, math.nan))
-            elif self._health.agreed(number):
+                health.contradicted(number, stamp, place or (math.nan, math.nan))
+            elif health.agreed(number):
                 text = f"Landmark {number} stands again where the map has it."
-                self._emit(LocalizerEvent(stamp, "landmark_back", text, number))
+                self._events.add(LocalizerEvent(stamp, "landmark_back", text, number))
             return False
-        taken, gap = track.filter.take(measurement, mark, settings.tolerance)
+        taken, gap = track.filter.take(measurement, mark, track.tolerance)
         if taken:
             self._last_agreed[number] = stamp
-            self._health.agreed(number)
+            health.agreed(number)
+            if gap < 0.5 * settings.tolerance:
+                for verdict in health.witnessed(number):
+                    self._tell(verdict, stamp)
+            self._seen(track, measurement)
             return True
-        place = self._place(track.filter.pose, measurement)
+        place = place_of(track.filter.pose, measurement, self._camera_forward)
         offset = (None, None) if place is None else (place[0] - mark.x, place[1] - mark.y)
         text = f"Landmark {number} appears {100 * gap:.0f} cm from where it should be."
-        self._report(stamp, "rejected", text, number, offset)
+        self._events.report(LocalizerEvent(stamp, "rejected", text, number, *offset))
         # A number read where another landmark stands speaks against the reading, not the pose.
-        misread = place is not None and self._health.stands_another(number, place)
+        misread = place is not None and health.stands_another(number, place)
         if gap > settings.tolerance and not misread:
-            self._against.append(measurement)
-            self._gap = gap
-            del self._against[:-200]
+            self._doubt.add(measurement, gap)
         if place is not None and self._others_agree(number, stamp):
-            verdict = self._health.contradicted(number, stamp, place)
-            if verdict is not None:
-                far = 100 * math.hypot(verdict.dx, verdict.dy)
-                what = (
-                    f"Landmark {number} has been moved by {far:.0f} cm"
-                    if verdict.code == "landmark_moved"
-                    else f"Landmark {number} is read where another one stands"
-                )
-                self._emit(
-                    LocalizerEvent(stamp, verdict.code, f"{what}.", number, verdict.dx, verdict.dy)
-                )
+            self._contradicted(number, stamp, place)
         return False
 
+    def _contradicted(self, number: int, stamp: float, place: Point) -> None:
+        """A landmark is not in its place though the pose is right: is it to be left out?"""
+        verdict = self._health.contradicted(number, stamp, place)
+        if verdict is not None:
+            self._tell(verdict, stamp)
+
+    def _tell(self, verdict: Verdict, stamp: float) -> None:
+        number = verdict.landmark
+        self._events.add(
+            LocalizerEvent(stamp, verdict.code, verdict.text, number, verdict.dx, verdict.dy)
+        )
+
     def _others_agree(self, number: int, stamp: float) -> bool:
-        """Another landmark agreed with the pose within the last two sweeps or so."""
         return any(
-            other != number and stamp - when < 8.0 for other, when in self._last_agreed.items()
+            other != number and stamp - when < _SWEEPS for other, when in self._last_agreed.items()
         )
 
-    def _judge_contradictions(self, stamp: float) -> None:
-        """LOST when two landmarks, or one for long, contradict the pose and none agrees."""
-        counts: dict[int, int] = {}
-        for measurement in self._against:
-            counts[measurement.landmark] = counts.get(measurement.landmark, 0) + 1
-        if not counts:
+    def _seen(self, track: Track, measurement: RangeBearing) -> None:
+        pan = measurement.pan
+        if self._presence is None or pan is None or not math.isfinite(measurement.range):
             return
-        firm = sorted(number for number, count in counts.items() if count >= 2)
-        first = self._against[0].stamp
-        ids = " and ".join(str(number) for number in sorted(counts))
-        limit = f"{100 * self.settings.tolerance:.0f} cm"
-        # The paper's tracking drifts in heading until every landmark contradicts it, so there the
-        # first one is enough, as the paper has it.
-        # So is one that agreed before: it has not moved by itself.
-        paper = self.settings.method == "paper"
-        hasty = any(
-            count >= 3 and (paper or number in self._last_agreed)
-            for number, count in counts.items()
-        )
-        if len(firm) >= 2 or (firm and stamp - first > 5.0) or hasty:
-            self._lose(
+        number, off_axis = measurement.landmark, measurement.bearing - pan
+        if self._presence.saw(number, measurement.range, off_axis, track.filter.pose):
+            text = f"Landmark {number} is seen again."
+            self._events.add(LocalizerEvent(measurement.stamp, "landmark_back", text, number))
+
+    def _predicted_to(self, stamp: float, track: Track) -> Track:
+        """The track at ``stamp``, or at its last measurement where that came later."""
+        ahead = self._ahead
+        if ahead is None or ahead.stamp > stamp or ahead.stamp < track.stamp:
+            ahead = track.fork()
+        ahead.predict(self._history, stamp)
+        return ahead
+
+    def _look(self, stamp: float, pan: float, seen: Collection[int]) -> None:
+        """Notice what is not in a picture though it should be."""
+        track, presence = self._track, self._presence
+        if track is None or presence is None or self._belief.lost:
+            return
+        then = self._predicted_to(stamp, track)
+        if then.stamp != stamp:
+            return
+        if self._ahead is None:
+            self._ahead = then
+        missing, chance, hidden = presence.look(stamp, then.filter.pose, pan, seen)
+        for number in hidden:
+            text = f"Landmark {number} should be seen and is not: something hides it."
+            self._events.add(LocalizerEvent(stamp, "landmark_hidden", text, number))
+        if chance < _CHANCE and stamp - then.moved > _STANDS_AFTER:
+            ids = " and ".join(str(number) for number in missing)
+            self._belief.lose(
                 stamp,
-                f"Landmark {ids} appear{'s' if len(counts) == 1 else ''} more than {limit} from "
-                "where the pose has them: the robot has been moved, or has slipped.",
-            )
-        elif firm and self._status is not Status.DEGRADED:
-            self._set(
-                stamp, Status.DEGRADED, f"Landmark {ids} appears more than {limit} off its place."
+                f"Landmark {ids}, seen from here before, is missing: the robot has been moved, or "
+                "something stands before it.",
             )
 
-    def _judge(self, stamp: float, moving: float, sigma: float) -> None:
-        settings = self.settings
-        if self._status in (Status.LOST, Status.FIXING):
+    # ---- believing in it ---------------------------------------------------------------------
+
+    def _judge_doubt(self, track: Track) -> None:
+        """LOST when too much contradicts the pose and nothing agrees."""
+        standing = track.stamp - track.moved > _STANDS_AFTER
+        judged = self._doubt.judge(track.stamp, self._last_agreed, standing)
+        if judged is None:
             return
-        if sigma > settings.lost_sigma:
-            self._lose(stamp, f"The position is known only to {100 * sigma:.0f} cm.")
-        elif moving > settings.lost_after:
-            self._lose(stamp, f"No landmark has been seen during {moving:.0f} s of driving.")
-        elif sigma > settings.degraded_sigma:
-            text = f"The position is known only to {100 * sigma:.0f} cm."
-            self._set(stamp, Status.DEGRADED, text)
-        elif moving > settings.degraded_after:
-            text = f"No landmark has been seen during {moving:.0f} s of driving."
-            self._set(stamp, Status.DEGRADED, text)
-        elif len(self._against) < 2:
-            self._set(stamp, Status.TRACKING, "")
+        if judged.status == "lost":
+            self._belief.lose(track.stamp, judged.reason)
+        else:
+            self._belief.doubt(track.stamp, judged.reason)
 
-    def _set(self, stamp: float, status: Status, reason: str) -> None:
-        if status is not self._status:
-            code = "recovered" if status is Status.TRACKING else "degraded"
-            self._emit(LocalizerEvent(stamp, code, reason or "The pose is certain again."))
-        self._status, self._reason = status, reason
-
-    def _lose(self, stamp: float, reason: str) -> None:
-        if self._status is not Status.LOST:
-            self._status, self._reason = Status.LOST, reason
-            self._emit(LocalizerEvent(stamp, "lost", reason))
-
-    def _unfiltered(self, predicted: Pose2D, measurement: RangeBearing) -> Pose2D:
-        """R_2^2, with the heading from the bearing."""
-        mark = self._landmarks[measurement.landmark]
-        moved = radial_correction(predicted, measurement, mark, self._camera_forward)
-        camera = predicted.ahead(self._camera_forward)
-        direction = math.atan2(mark.y - camera[1], mark.x - camera[0])
-        return Pose2D(moved.x, moved.y, wrap_angle(direction - measurement.bearing))
-
-    def _place(self, pose: Pose2D, measurement: RangeBearing) -> Point | None:
-        """Where in `map` a measured landmark appears."""
-        if not (math.isfinite(measurement.range) and math.isfinite(measurement.range_sigma)):
-            return None
-        camera = pose.ahead(self._camera_forward)
-        direction = pose.heading + measurement.bearing
-        return (
-            camera[0] + measurement.range * math.cos(direction),
-            camera[1] + measurement.range * math.sin(direction),
-        )
-
-    def _report(
-        self,
-        stamp: float,
-        code: str,
-        text: str,
-        landmark: int,
-        offset: tuple[float | None, float | None] = (None, None),
-    ) -> None:
-        """Emit, but for each landmark not more often than every two seconds."""
-        if stamp - self._reported.get((code, landmark), -math.inf) < 2.0:
-            return
-        if len(self._reported) > 1000:
-            self._reported.clear()
-        self._reported[code, landmark] = stamp
-        self._emit(LocalizerEvent(stamp, code, text, landmark, *offset))
-
-    def _emit(self, event: LocalizerEvent) -> None:
-        self._events.append(event)
+    def _judge(self, track: Track) -> None:
+        doubted = self._doubt.spread > 0.0
+        self._belief.judge(track.stamp, track.moving, _sigma(track), doubted)
 
 
-def _largest_sigma(covariance: NDArray[np.float64]) -> float:
+def _sigma(track: Track) -> float:
     """Of the position, along the worst direction."""
-    a, b, d = float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1])
-    return math.sqrt(max(0.5 * (a + d) + math.hypot(0.5 * (a - d), b), 0.0))
+    (xx, xy, _), (_, yy, _), _ = track.filter.pose_covariance.tolist()
+    return largest_sigma(xx, xy, yy)

@@ -5,8 +5,8 @@ Eqs. 4-9 of the paper do not form a rigid motion as printed (method.md, "Time en
 
     kappa = tan(steering) / L,   turn = speed dt kappa
 
-In the robot's own frame it ends ``d sinc(turn)`` ahead and ``d (1 - cos turn) / turn`` to the
-left, d = speed dt. Written so, nothing jumps or cancels where the curvature goes to zero.
+It is written as a chord of that circle, so that nothing jumps or cancels where the curvature goes
+to zero.
 """
 
 from __future__ import annotations
@@ -24,20 +24,58 @@ from polepilot.core.geometry import Pose2D, wrap_angle
 from polepilot.core.observation import Odometry
 
 _SMALL_TURN = 1e-3
-"""Below this turn (rad) the derivatives use their series, whose error is then under 1e-13."""
+"""Below half of this turn (rad) series are used, whose error is then under 1e-13."""
+
+
+class Arc(NamedTuple):
+    """A piece of a circle (m, rad), and how it depends on its length and curvature."""
+
+    dx: float
+    dy: float
+    turn: float
+    dx_by_distance: float
+    dy_by_distance: float
+    dx_by_curvature: float
+    """At a fixed length, m²; the turn's derivatives are the curvature and the length."""
+    dy_by_curvature: float
+
+
+def arc(heading: float, distance: float, curvature: float) -> Arc:
+    """Drive ``distance`` metres with ``curvature`` (1/m), beginning with ``heading``.
+
+    The chord lies in the direction half way through the turn and is ``distance`` sinc(turn / 2)
+    long: exact, and without a jump where the curvature goes to zero.
+    """
+    turn = distance * curvature
+    half = 0.5 * turn
+    middle = heading + half
+    cos, sin = math.cos(middle), math.sin(middle)
+    if abs(half) < _SMALL_TURN:
+        square = half * half
+        ratio, slope = 1.0 - square / 6.0, half * (square / 30.0 - 1.0 / 3.0)
+        cos_half, sin_half = 1.0 - 0.5 * square, half * ratio
+    else:
+        cos_half, sin_half = math.cos(half), math.sin(half)
+        ratio = sin_half / half
+        slope = (cos_half - ratio) / half
+    chord = distance * ratio
+    # By curvature the chord turns by distance / 2 and changes its length.
+    longer, turned = 0.5 * distance * distance * slope, 0.5 * distance * chord
+    return Arc(
+        chord * cos,
+        chord * sin,
+        turn,
+        cos * cos_half - sin * sin_half,
+        sin * cos_half + cos * sin_half,
+        longer * cos - turned * sin,
+        longer * sin + turned * cos,
+    )
 
 
 def advance(pose: Pose2D, speed: float, steering: float, dt: float, wheelbase: float) -> Pose2D:
     """Where `base_link` is after ``dt`` seconds at constant speed (m/s) and steering (rad)."""
-    distance = speed * dt
-    turn = distance * math.tan(steering) / wheelbase
-    ahead, left = distance * _sinc(turn), distance * _rise(turn)
-    cos, sin = math.cos(pose.heading), math.sin(pose.heading)
-    return Pose2D(
-        pose.x + cos * ahead - sin * left,
-        pose.y + sin * ahead + cos * left,
-        wrap_angle(pose.heading + turn),
-    )
+    piece = arc(pose.heading, speed * dt, math.tan(steering) / wheelbase)
+    return Pose2D(pose.x + piece.dx, pose.y + piece.dy, wrap_angle(pose.heading + piece.turn))
 
 
 def advance_with_jacobians(
@@ -45,25 +83,18 @@ def advance_with_jacobians(
 ) -> tuple[Pose2D, NDArray[np.float64]]:
     """``advance`` and its 3 x 5 Jacobian by (x, y, heading, speed, steering)."""
     tan = math.tan(steering)
-    curvature = tan / wheelbase
-    distance = speed * dt
-    turn = distance * curvature
-    ahead, left = distance * _sinc(turn), distance * _rise(turn)
-    cos, sin = math.cos(pose.heading), math.sin(pose.heading)
-    dx, dy = cos * ahead - sin * left, sin * ahead + cos * left
-    # By distance: the velocity turns with the heading. By curvature: derivatives of sinc, rise.
-    ahead_v, left_v = dt * math.cos(turn), dt * math.sin(turn)
-    curvature_by_steering = (1.0 + tan * tan) / wheelbase
-    ahead_g = distance * distance * _sinc_derivative(turn) * curvature_by_steering
-    left_g = distance * distance * _rise_derivative(turn) * curvature_by_steering
+    curvature, distance = tan / wheelbase, speed * dt
+    piece = arc(pose.heading, distance, curvature)
+    bend = (1.0 + tan * tan) / wheelbase
     jacobian = np.array(
         [
-            [1.0, 0.0, -dy, cos * ahead_v - sin * left_v, cos * ahead_g - sin * left_g],
-            [0.0, 1.0, dx, sin * ahead_v + cos * left_v, sin * ahead_g + cos * left_g],
-            [0.0, 0.0, 1.0, curvature * dt, distance * curvature_by_steering],
+            [1.0, 0.0, -piece.dy, dt * piece.dx_by_distance, bend * piece.dx_by_curvature],
+            [0.0, 1.0, piece.dx, dt * piece.dy_by_distance, bend * piece.dy_by_curvature],
+            [0.0, 0.0, 1.0, curvature * dt, distance * bend],
         ]
     )
-    return Pose2D(pose.x + dx, pose.y + dy, wrap_angle(pose.heading + turn)), jacobian
+    moved = Pose2D(pose.x + piece.dx, pose.y + piece.dy, wrap_angle(pose.heading + piece.turn))
+    return moved, jacobian
 
 
 class Step(NamedTuple):
@@ -260,25 +291,3 @@ def _follow(
 
 def _slope(difference: float, lag: float) -> float:
     return difference / lag if lag > 0 else 0.0
-
-
-def _sinc(turn: float) -> float:
-    """sin(a) / a."""
-    return math.sin(turn) / turn if turn else 1.0
-
-
-def _rise(turn: float) -> float:
-    """(1 - cos a) / a, without the cancellation."""
-    return math.sin(0.5 * turn) * _sinc(0.5 * turn)
-
-
-def _sinc_derivative(turn: float) -> float:
-    if abs(turn) < _SMALL_TURN:
-        return -turn / 3.0 + turn**3 / 30.0
-    return (math.cos(turn) - math.sin(turn) / turn) / turn
-
-
-def _rise_derivative(turn: float) -> float:
-    if abs(turn) < _SMALL_TURN:
-        return 0.5 - turn * turn / 8.0
-    return (math.sin(turn) - _rise(turn)) / turn

@@ -11,15 +11,17 @@ what the fix left, plus a share of the way driven since.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from polepilot.core.geometry import Pose2D
+from polepilot.core.geometry import Pose2D, wrap_angle
 from polepilot.core.landmark import Landmark
+from polepilot.core.localization.fix import Fix
 from polepilot.core.localization.kalman import AxisFilter
-from polepilot.core.localization.odometry import Step, advance
+from polepilot.core.localization.odometry import OdometryHistory, Step, advance
 from polepilot.core.observation import RangeBearing
 
 _POSITION_PER_METRE = 0.06
@@ -41,6 +43,16 @@ def radial_correction(
     return Pose2D(predicted.x + dx * excess, predicted.y + dy * excess, predicted.heading)
 
 
+def unfiltered(
+    predicted: Pose2D, measurement: RangeBearing, landmark: Landmark, camera_forward: float
+) -> Pose2D:
+    """R_2^2, with the heading from the bearing."""
+    moved = radial_correction(predicted, measurement, landmark, camera_forward)
+    camera = predicted.ahead(camera_forward)
+    direction = math.atan2(landmark.y - camera[1], landmark.x - camera[0])
+    return Pose2D(moved.x, moved.y, wrap_angle(direction - measurement.bearing))
+
+
 @dataclass(slots=True)
 class RadialFilter:
     """Pose by the paper's method. Same verbs as the EKF."""
@@ -52,6 +64,26 @@ class RadialFilter:
     y: AxisFilter = field(default_factory=AxisFilter)
     position_variance: float = 1.0
     heading_variance: float = 1.0
+
+    @property
+    def lag_errors(self) -> tuple[float, float]:
+        """The paper knows of no lags."""
+        return 0.0, 0.0
+
+    def retuned(self, motor: float, servo: float) -> None:
+        """The history's time constants were raised by so many seconds: no matter here."""
+
+    def begin(
+        self,
+        found: Fix,
+        stamp: float,
+        sightings: Sequence[tuple[RangeBearing, Landmark]],
+        history: OdometryHistory,
+    ) -> float:
+        """Start at a fix; the sightings behind it say no more than it does itself."""
+        del stamp, sightings, history
+        self.reset(found.pose, found.covariance)
+        return 1.0
 
     def reset(self, pose: Pose2D, covariance: NDArray[np.float64]) -> None:
         self.pose = pose
@@ -84,14 +116,19 @@ class RadialFilter:
     def pose_covariance(self) -> NDArray[np.float64]:
         return np.diag([self.position_variance, self.position_variance, self.heading_variance])
 
-    def predict(self, step: Step) -> None:
-        if step.speed == 0.0:
-            return
-        self.pose = advance(self.pose, step.speed, step.steering, step.dt, self.wheelbase)
-        driven = abs(step.speed) * step.dt
-        share = _POSITION_PER_METRE**2 + self.heading_variance * driven
-        self.position_variance += share * driven
-        self.heading_variance += _HEADING_PER_METRE**2 * driven
+    def predict(self, steps: Iterable[Step]) -> float:
+        """Move by steps of odometry; returns how many seconds of it the robot moved."""
+        moving = 0.0
+        for step in steps:
+            if step.speed == 0.0:
+                continue
+            moving += step.dt
+            self.pose = advance(self.pose, step.speed, step.steering, step.dt, self.wheelbase)
+            driven = abs(step.speed) * step.dt
+            share = _POSITION_PER_METRE**2 + self.heading_variance * driven
+            self.position_variance += share * driven
+            self.heading_variance += _HEADING_PER_METRE**2 * driven
+        return moving
 
     def take(
         self, measurement: RangeBearing, landmark: Landmark, tolerance: float

@@ -7,8 +7,8 @@ reckoning, to the newest moment, and trusts it the less the farther it has drive
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Mapping
+from collections import Counter, deque
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -22,6 +22,8 @@ from polepilot.core.observation import RangeBearing
 _PER_LANDMARK = 6
 """Sightings of one landmark that take part in a fix, the newest."""
 _NOTHING = FixRefusal("No landmark of the map has been seen.", "none")
+_SHARES = (1.0, 0.5, 0.25, 0.125)
+"""Parts of the window that are tried one after the other, the newest."""
 _LONGEST_WAY = 1.5
 """Metres driven after which a sighting says nothing of the present pose any more."""
 
@@ -51,23 +53,53 @@ class FixSearch:
         self._sightings.clear()
         self.refusal = _NOTHING
 
+    def refuse(self, reason: str) -> None:
+        """Whoever asked does not believe the fix found, for this reason."""
+        self.refusal = FixRefusal(reason, "contradiction")
+
     def add(self, measurement: RangeBearing) -> None:
         """Keep a sighting of a landmark of the map that carries a range."""
         if math.isfinite(measurement.range) and math.isfinite(measurement.range_sigma):
             self._sightings.append(measurement)
 
-    def attempt(self, stamp: float) -> Fix | None:
-        """A confirmed pose at ``stamp``, or None with the reason in ``refusal``."""
+    def attempts(self, stamp: float) -> Iterator[Fix]:
+        """Confirmed poses at ``stamp``, each with the sightings behind it in ``used``.
+
+        The first is from all sightings of the window. Whoever does not believe it may ask for the
+        next one, from the newest sightings alone: a robot that was pushed or carried has older
+        ones from another place. Without any the reason is in ``refusal``.
+        """
         while self._sightings and self._sightings[0].stamp < stamp - self.window:
             self._sightings.popleft()
+        seen, refusal = -1, self.refusal
+        for share in _SHARES:
+            chosen = self._chosen(stamp, stamp - share * self.window)
+            if len(chosen) == seen:
+                continue
+            seen = len(chosen)
+            found = self._attempt(stamp, chosen)
+            if share == 1.0:
+                refusal = self.refusal
+            if found is not None:
+                yield found
+        self.refusal = refusal
+
+    def _chosen(self, stamp: float, since: float) -> list[RangeBearing]:
+        """The newest sightings of each landmark, oldest first."""
         chosen: list[RangeBearing] = []
         counts: dict[int, int] = {}
         for sighting in reversed(self._sightings):
+            if sighting.stamp < since:
+                break
             count = counts.get(sighting.landmark, 0)
             if sighting.stamp <= stamp and count < _PER_LANDMARK:
                 counts[sighting.landmark] = count + 1
                 chosen.append(sighting)
         chosen.reverse()
+        return chosen
+
+    def _attempt(self, stamp: float, chosen: list[RangeBearing]) -> Fix | None:
+        counts = Counter(sighting.landmark for sighting in chosen)
         if sum(count >= self.confirmations for count in counts.values()) < 2:
             if len(counts) == 1:
                 number = next(iter(counts))

@@ -132,7 +132,10 @@ def replay(
     settings = settings or dataset.settings
     half_range = max(abs(dataset.pan_minimum), abs(dataset.pan_maximum))
     settings = replace(settings, noise=replace(settings.noise, pan_range=half_range))
-    localizer = Localizer(dataset.landmarks, dataset.vehicle, dataset.camera.forward, settings)
+    camera = dataset.camera
+    localizer = Localizer(
+        dataset.landmarks, dataset.vehicle, camera.forward, settings, camera.half_view
+    )
     pan = PanTrack(dataset.pan_minimum, dataset.pan_maximum)
     # Dead reckoning for comparison takes the commands as they are.
     commands = OdometryHistory(dataset.vehicle.wheelbase)
@@ -160,9 +163,9 @@ def replay(
             continue
         result.frames += 1
         told = len(result.events)
-        seen_now = _look(sample, see, pan, result)
+        angle, seen_now = _look(sample, see, pan, result)
         result.pictures.append((stamp, seen_now))
-        localizer.add_measurements(seen_now)
+        localizer.add_picture(stamp, angle, seen_now)
         if localizer.status is Status.LOST:
             result.events += localizer.events()
             localizer.refix(localizer.reason)
@@ -284,25 +287,26 @@ def _stand(told: Odometry, begin: float, end: float) -> list[Odometry]:
 
 def _look(
     frame: FrameFile | Sighted, see: See, pan: PanTrack, result: ReplayResult
-) -> list[RangeBearing]:
-    """What one picture tells, with the pan angle of its moment."""
+) -> tuple[float | None, list[RangeBearing]]:
+    """The pan angle of one picture's moment, where it is known, and what the picture tells."""
     if isinstance(frame, Sighted):
-        return list(frame.measurements)
+        angles = [frame.pan, *(m.pan for m in frame.measurements)]
+        return next((a for a in angles if a is not None), None), list(frame.measurements)
     try:
         detections = see(frame)
     except ImageError as error:
         text = f"samples.jsonl:{frame.line}: picture left out: {error.message}"
         result.events.append(LocalizerEvent(frame.stamp, "frame_skipped", text))
-        return []
-    if not detections:
-        return []
+        return None, []
     pointing = pan.at(frame.stamp)
     if pointing is None:
+        if not detections:
+            return None, []
         text = f"samples.jsonl:{frame.line}: picture left out: no pan reading within 0.3 s."
         result.events.append(LocalizerEvent(frame.stamp, "frame_skipped", text))
-        return []
+        return None, []
     angle, sigma = pointing
-    return [
+    return angle, [
         RangeBearing(
             stamp=frame.stamp,
             landmark=detection.id,

@@ -154,6 +154,7 @@ class Robot:
             self.settings.model.vehicle,
             self.settings.model.camera.forward,
             self.settings.localizer,
+            self.settings.model.camera.half_view,
         )
         model = self.settings.model
         self._gaze = Gaze(model.camera, model.pan, landmarks, Scenery(site.segments()))
@@ -352,8 +353,8 @@ class Robot:
         measurements: list[RangeBearing] = [
             to_range_bearing(detection, sighting.stamp, angle) for detection in sighting.detections
         ]
-        localizer.add_measurements(measurements)
-        self._inputs.add_sighting(sighting.stamp, measurements, sighting.frame)
+        localizer.add_picture(sighting.stamp, angle, measurements)
+        self._inputs.add_sighting(sighting.stamp, measurements, sighting.frame, angle)
 
     def _decide(self, now: float, dt: float) -> DriveCommand:
         """What the mission wants; standing still wherever that is in doubt."""

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from polepilot.core.geometry import Pose2D, wrap_angle
 from polepilot.core.landmark import Landmark
-from polepilot.core.localization.ekf import STATES, NoiseModel, PoseFilter
+from polepilot.core.localization.ekf import STATES, PoseFilter
+from polepilot.core.localization.noise import NoiseModel
 from polepilot.core.localization.odometry import OdometryHistory, Step
 from polepilot.core.observation import RangeBearing
 
@@ -30,7 +31,7 @@ _ROUNDS = 2
 
 @dataclass(frozen=True, slots=True)
 class _Belief:
-    """Around one picture: predicted to it, and with it; ``moved``: from the one before, 12 x 12."""
+    """Around one picture: predicted to it, and with it; ``moved``: from the one before, square."""
 
     moved: Array
     predicted: Array
@@ -90,8 +91,7 @@ class Smoother:
         for stamp, sightings in pictures:
             steps = list(self._history.steps(now, stamp))
             moved = self._moved(tracked, steps)
-            for step in steps:
-                tracked.predict(step)
+            tracked.predict(steps)
             now = stamp
             predicted, covariance = tracked.state.copy(), tracked.covariance.copy()
             for sighting in sightings:
@@ -111,8 +111,7 @@ class Smoother:
         probe = PoseFilter(self._history.wheelbase, self._forward, self._still, self._gate)
         probe.state[:] = tracked.state
         probe.covariance = np.eye(STATES)
-        for step in steps:
-            probe.predict(step)
+        probe.predict(steps)
         # From independent errors of size 1, how pose and distortions hang together afterwards is
         # the derivative by the distortions. By the heading, the whole way turns about its start.
         moved = np.eye(STATES)

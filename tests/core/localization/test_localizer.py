@@ -318,11 +318,39 @@ def test_unknown_and_broken_measurements_are_left_out() -> None:
     assert [(e.code, e.landmark) for e in localizer.events()] == [("landmark_unknown", 9)]
 
 
-def test_a_measurement_from_before_the_last_one_is_left_out_and_said() -> None:
+def test_a_measurement_that_comes_far_too_late_is_left_out_and_said() -> None:
     localizer = standing()
-    localizer.add_measurements([sight(1.0, 1)])
-    localizer.add_measurements([sight(0.5, 2)])
+    localizer.add_measurements([sight(3.0, 1)])
+    localizer.add_measurements([sight(1.5, 2)])
     assert [event.code for event in localizer.events()] == ["late"]
+
+
+def test_pictures_out_of_order_are_applied_in_theirs() -> None:
+    recording = record(162, 40.0)
+    poses = []
+    for shuffled in (False, True):
+        localizer = Localizer(recording.landmarks, Vehicle(), FORWARD)
+        held: tuple[float, list[RangeBearing]] | None = None
+        pictures = 0
+        for event in recording.events:
+            if isinstance(event, Odometry):
+                localizer.add_odometry(event)
+                continue
+            pictures += 1
+            if shuffled and event[0] > 10.0 and pictures % 5 == 0:
+                held = event
+                continue
+            localizer.add_measurements(event[1])
+            if held is not None and event[0] > held[0] + 0.2:
+                localizer.add_measurements(held[1])
+                held = None
+        now = max(recording.truth)
+        estimate = localizer.estimate(now)
+        assert estimate is not None
+        assert "late" not in [event.code for event in localizer.events()]
+        poses.append(np.array(estimate.pose))
+        assert estimate.pose.distance_to(recording.truth[now].position) < 0.15
+    assert poses[0] == pytest.approx(poses[1], abs=2e-3)
 
 
 def test_memory_is_bounded() -> None:

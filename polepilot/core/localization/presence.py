@@ -1,0 +1,131 @@
+"""Landmarks that should be seen and are not: hidden, or the robot is not where it seems."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from polepilot.core.geometry import Pose2D
+from polepilot.core.landmark import Landmark
+
+_MARGIN = math.radians(4.0)
+"""So far inside the picture a landmark must be expected to be looked for."""
+_NEARER = 1.03
+"""Nearer than this times the least depth at which a landmark was seen, none is expected."""
+_PLACE = 0.05
+"""Metres: within so much the view is the same, whatever stands in the way."""
+_SURE = 3
+"""Sightings from one place after which a landmark is sure to be seen from there."""
+_HIDDEN_LOOKS = 12
+_HIDDEN_SPAN = 8.0
+"""Seconds: more than one pass of the camera."""
+
+
+@dataclass(slots=True)
+class _Record:
+    """How one landmark was looked for."""
+
+    place: tuple[float, float] = (math.inf, math.inf)
+    """From where it was seen last."""
+    hits: int = 0
+    """Sightings from there."""
+    overlooked: int = 0
+    """Looks in vain from there, between sightings."""
+    missed: int = 0
+    """Looks in vain since the last sighting."""
+    first_missed: float = 0.0
+    ever: int = 0
+    hidden: bool = False
+
+
+class Presence:
+    """Compares what is seen with what should be; bounded in memory."""
+
+    def __init__(
+        self, landmarks: Mapping[int, Landmark], camera_forward: float, half_view: float
+    ) -> None:
+        """``half_view``: half of the camera's horizontal angle of view, radians."""
+        self._ids = list(landmarks)
+        self._points = np.array([mark.position for mark in landmarks.values()]).reshape(-1, 2)
+        self._forward = camera_forward
+        self._inside = half_view - _MARGIN
+        self._records = {number: _Record() for number in landmarks}
+        self._nearest, self._farthest = math.inf, 0.0
+
+    def forget(self) -> None:
+        """The pose was wrong: so is what was expected from it."""
+        for record in self._records.values():
+            record.place, record.missed = (math.inf, math.inf), 0
+
+    def expected(self, pose: Pose2D, pan: float) -> list[int]:
+        """Landmarks that stand well inside the picture, at distances at which some were seen."""
+        x, y = pose.ahead(self._forward)
+        offsets = self._points - (x, y)
+        direction = pose.heading + pan
+        cos, sin = math.cos(direction), math.sin(direction)
+        depth = offsets @ (cos, sin)
+        aside = offsets @ (-sin, cos)
+        distance = np.hypot(depth, aside)
+        inside = np.abs(aside) < math.tan(self._inside) * depth
+        # How much of a pole fits into the picture depends on its depth.
+        inside &= (depth > _NEARER * self._nearest) & (distance < self._farthest)
+        return [self._ids[i] for i in np.flatnonzero(inside)]
+
+    def saw(self, number: int, distance: float, off_axis: float, pose: Pose2D) -> bool:
+        """``number`` was seen where it should be; True if it was thought hidden.
+
+        Args:
+            distance: metres.
+            off_axis: bearing in the picture, radians.
+        """
+        self._nearest = min(self._nearest, distance * math.cos(off_axis))
+        self._farthest = max(self._farthest, distance)
+        record = self._records[number]
+        if math.dist(record.place, pose.position) > _PLACE:
+            record.place, record.hits, record.overlooked = pose.position, 0, 0
+        else:
+            record.overlooked += record.missed
+        record.hits += 1
+        record.ever += 1
+        record.missed = 0
+        was, record.hidden = record.hidden, False
+        return was
+
+    def look(
+        self, stamp: float, pose: Pose2D, pan: float, seen: Collection[int]
+    ) -> tuple[list[int], float, list[int]]:
+        """A picture was taken.
+
+        Returns:
+            landmarks that were seen from here before and are missing in this picture; how likely
+            it is that they were overlooked in it and the ones before; and landmarks that have not
+            been seen for so long that something must hide them, once each.
+        """
+        missing: list[int] = []
+        hidden: list[int] = []
+        chance = 1.0
+        for number in self.expected(pose, pan):
+            if number in seen:
+                continue
+            record = self._records[number]
+            if record.missed == 0:
+                record.first_missed = stamp
+            record.missed += 1
+            near = math.dist(record.place, pose.position) <= _PLACE
+            if near and record.hits >= _SURE:
+                # Laplace's rule of succession.
+                missing.append(number)
+                share = (record.overlooked + 1) / (record.overlooked + record.hits + 2)
+                chance *= share**record.missed
+            elif (
+                record.missed >= _HIDDEN_LOOKS
+                and stamp - record.first_missed > _HIDDEN_SPAN
+                and record.ever >= _SURE
+                and not record.hidden
+            ):
+                record.hidden = True
+                hidden.append(number)
+        return missing, chance, hidden

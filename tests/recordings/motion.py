@@ -20,6 +20,8 @@ CONTROL = 10
 READING = 4
 """Steps between two readings of the potentiometer."""
 COUNTS = 1023
+ENDS = 0.045
+"""The camera turns round so long before the potentiometer's ends, radians."""
 STEEPEST = math.radians(30)
 Floats = NDArray[np.float64]
 
@@ -185,7 +187,7 @@ def _sweep(rng: Rng, scenario: Scenario, count: int) -> Floats:
     rate = way * full
     out = np.empty(count)
     for index in range(count):
-        if angle * way > HALF_SWEEP - 0.02:
+        if angle * way > HALF_SWEEP - ENDS:
             way = -way
         rate += min(max(way * full - rate, -8.0 * STEP), 8.0 * STEP)
         angle += rate * uneven[index] * STEP
@@ -198,11 +200,11 @@ def _shift(rng: Rng, scenario: Scenario, x: float, y: float, heading: float, at:
     """Where the robot is put, or pushed, from where it is."""
     if scenario.kind == "lifted":
         reach, turn = LIFTED_BY, float(rng.uniform(0.5, 2.5)) * int(rng.choice([-1, 1]))
-        lasts, rise, before, after = 0.8, 0.25, 1.0, float(rng.uniform(4.0, 7.0))
+        lasts, rise, stands = 0.8, 0.25, float(rng.uniform(4.0, 7.0))
     else:
         reach = float(rng.uniform(0.3, 0.6))
         turn = math.radians(float(rng.uniform(10, 40))) * int(rng.choice([-1, 1]))
-        lasts, rise, before, after = 0.4, 0.0, 0.0, 0.0
+        lasts, rise, stands = 0.4, 0.0, 0.0
     width, depth = scenario.size
     best = (0.0, 0.0)
     room = -math.inf
@@ -216,7 +218,7 @@ def _shift(rng: Rng, scenario: Scenario, x: float, y: float, heading: float, at:
             best, room = (dx, dy), least
         if least > scenario.margin:
             break
-    return Shift(at, lasts, *best, turn, rise, before, after)
+    return Shift(at, lasts, *best, turn, rise, stands)
 
 
 def drive(scenario: Scenario) -> Course:
@@ -259,7 +261,7 @@ def drive(scenario: Scenario) -> Course:
         if index % CONTROL == 0:
             still = t < scenario.stands or shift_at - stand - 0.3 <= t < shift_at or taken
             if shift is not None:
-                still = still or shift.at <= t < shift.at + shift.lasts + shift.stands_after
+                still = still or shift.at <= t < shift.at + shift.lasts + shift.stands
             if scenario.kind == "push":
                 still = t < scenario.stands
             wish = (0.0, 0.0) if still else driver.command(x, y, heading)

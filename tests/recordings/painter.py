@@ -23,6 +23,7 @@ Floats = NDArray[np.float32]
 SHADES = 64
 SEGMENT = 0.05
 COARSE = 16
+GOLDEN = 0.6180339887
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -191,10 +192,13 @@ class Painter:
         count = 8 if smear < 3.0 else 16
         down, aside_, when = self._grid[count]
         step = [((order + 0.5) / count - 0.5)[:, None, None] for order in (down, aside_, when)]
+        across = np.arange(first, last)[None, None, :]
+        # Each column's samples lie between those of its neighbours: no edge snaps to a grid.
+        between = (across * GOLDEN % 1.0 - 0.5) / count
         rows = np.arange(top, bottom)[None, :, None] + step[0]
-        columns = (np.arange(first, last)[None, None, :] + step[1]).astype(np.float32)
+        columns = (across + step[1]).astype(np.float32)
         left = (np.float32(eye.cx) - columns) / np.float32(eye.constant)
-        up = ((eye.cy - rows) / eye.constant).astype(np.float32)
+        up = ((eye.cy - rows - between) / eye.constant).astype(np.float32)
         moments = self._moments(t, rows) + step[2] * eye.exposure
         yaw = np.interp(moments, course.t, self._yaw)
         dx = thing.x - np.interp(moments, course.t, self._camera_x)

@@ -20,6 +20,7 @@ from recordings.sights import Sight, sights
 
 _MADE_OF = ("scenario", "motion", "sights", "panorama", "painter", "sensor", "recording")
 BLANK = "blank.png"
+PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE]
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +90,7 @@ def write(scenario: Scenario, folder: Path, *, pictures: bool, limit: int | None
     painter = Painter(scenario, course)
     for index in range(len(course.frames))[:limit]:
         path = folder / _name(index)
-        cv2.imwrite(str(path), painter.paint(index), [cv2.IMWRITE_PNG_COMPRESSION, 1])
+        cv2.imwrite(str(path), painter.paint(index), PNG)
 
 
 def read_told(folder: Path) -> Told:

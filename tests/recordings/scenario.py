@@ -59,9 +59,8 @@ class Shift:
     turn: float
     rise: float = 0.0
     """How high it is lifted on the way."""
-    stands_before: float = 0.0
-    """Seconds for which the robot stood before, and ``stands_after`` for how long it does after."""
-    stands_after: float = 0.0
+    stands: float = 0.0
+    """Seconds for which the robot stands afterwards."""
 
 
 @dataclass(frozen=True, slots=True)

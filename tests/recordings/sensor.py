@@ -36,7 +36,7 @@ class Film:
         light = cv2.GaussianBlur(light, (5, 5), self._lens)
         # The exposure follows the picture's brightness, but not all the way.
         bright = float((light[::12, ::12] * self._gains).mean())
-        gain = min(self._target / max(bright, 0.02) ** 0.7 / 0.25**0.3, 1.5)
+        gain = min(self._target / max(bright, 0.02) ** 0.7 / 0.25**0.3, 1.1)
         value = light * (self._gains * np.float32(gain))
         first = int(rng.integers(0, BANK - value.size))
         noise = self._noise[first : first + value.size].reshape(value.shape)

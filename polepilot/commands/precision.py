@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from polepilot.core.localization.precision import PrecisionMap
+    from polepilot.core.localization.precision_grid import PrecisionMap
     from polepilot.core.localization.precision_suggest import Suggestions
 
 
@@ -72,7 +72,7 @@ def _centimetres(metres: float | None) -> str:
 
 def _summary(found: PrecisionMap) -> list[str]:
     heading = found.mean_heading
-    from polepilot.core.localization.precision import Reason
+    from polepilot.core.localization.precision_grid import Reason
 
     why_not = {
         Reason.NONE: "no landmark is seen, whichever way the robot looks",

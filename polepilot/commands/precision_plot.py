@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from polepilot.core.errors import InternalError
 from polepilot.core.geometry import Point
-from polepilot.core.localization.precision import CLASSES, PrecisionMap
+from polepilot.core.localization.precision_grid import CLASSES, PrecisionMap
 from polepilot.core.localization.precision_suggest import Suggestions
 from polepilot.core.printing.drawing import BLACK, WHITE, Box, Ink, Item, Shape, Sheet, Stroke, Text
 from polepilot.core.site import Site

@@ -1,8 +1,8 @@
 """What the detector can read, and how well: one model for the simulator and for predictions.
 
-The sigmas are those of the detector on pictures of two renderers that are not ours, with photographs
-and clutter behind the landmarks (docs/results: 95 % of the errors are within two of them). In plain
-rooms it is half as far off.
+The sigmas are those of the detector on pictures of two other programs, with photographs behind the
+landmarks (docs/results: 95 % of the errors are within two of them). In plain rooms it is half as
+far off.
 
 Formulas take numbers or numpy arrays alike. Distances are horizontal, from the pan axis to the
 landmark's axis; a bearing is measured from the optical axis, and its cosine is what counts here.

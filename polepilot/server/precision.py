@@ -50,7 +50,8 @@ _fields: OrderedDict[Any, PrecisionField] = OrderedDict()
 
 def compute(job: dict[str, Any]) -> dict[str, Any]:
     """Carry out one job, in the process."""
-    from polepilot.core.localization.precision import CLASSES, PrecisionField, fine_resolution
+    from polepilot.core.localization.precision import PrecisionField, fine_resolution
+    from polepilot.core.localization.precision_grid import CLASSES
     from polepilot.core.localization.precision_sight import Sweep
     from polepilot.core.localization.precision_suggest import suggest
     from polepilot.core.site import parse_site

@@ -12,7 +12,8 @@ import pytest
 
 from polepilot.commands.main import run
 from polepilot.commands.precision_plot import HEAT, draw, labels, png_bytes
-from polepilot.core.localization.precision import CLASSES, precision_map
+from polepilot.core.localization.precision import precision_map
+from polepilot.core.localization.precision_grid import CLASSES
 from polepilot.core.localization.precision_suggest import suggest
 from polepilot.core.site import read_site
 

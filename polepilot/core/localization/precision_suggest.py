@@ -25,7 +25,8 @@ import shapely
 from polepilot.core.errors import InputError
 from polepilot.core.geometry import Point
 from polepilot.core.landmark import Landmark, LandmarkKind, id_set, spacing
-from polepilot.core.localization.precision import PrecisionField, PrecisionMap, round_resolution
+from polepilot.core.localization.precision import PrecisionField, round_resolution
+from polepilot.core.localization.precision_grid import PrecisionMap
 from polepilot.core.localization.precision_sight import Bools, Floats, Sweep
 from polepilot.core.site import Site
 

@@ -20,13 +20,12 @@ from polepilot.core.landmark import Landmark, LandmarkKind
 from polepilot.core.localization.fix import DEFAULT_FIX, Fix, FixRefusal, fix
 from polepilot.core.localization.precision import (
     PrecisionField,
-    PrecisionMap,
-    Reason,
     coarse_resolution,
     fine_resolution,
     precision_at,
     precision_map,
 )
+from polepilot.core.localization.precision_grid import PrecisionMap, Reason
 from polepilot.core.localization.precision_sight import Sweep, Walls
 from polepilot.core.observation import RangeBearing
 from polepilot.core.scenery import Scenery

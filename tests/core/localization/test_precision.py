@@ -156,6 +156,7 @@ class TestAgainstFixes:
         assert abs(math.log(found.mean())) < math.log(1.1)
 
     @pytest.mark.soak
+    @pytest.mark.timeout(1800)
     def test_fifty_spots_of_500_fixes(self) -> None:
         rng = np.random.default_rng(42)
         counts = (9, 9, 8, 8, 8, 8)

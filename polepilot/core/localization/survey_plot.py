@@ -17,7 +17,7 @@ _WIDTH, _MARGIN, _FOOT = 900.0, 56.0, 64.0
 _WRONG = "#d55e00"
 _INSIDE = math.sqrt(5.991)
 """An ellipse of so many sigmas holds 95 % of a plane normal distribution."""
-_SHOWN = 0.04
+_SHOWN = 0.025
 """The largest ellipse becomes about this share of the drawing, by a round factor."""
 
 

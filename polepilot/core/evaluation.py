@@ -15,12 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polepilot.core.errors import DatasetError
-from polepilot.core.trajectory import Array, Trajectory
+from polepilot.core.trajectory import LARGEST, Array, Trajectory
 
 Align = Literal["none", "se2"]
 
 INSIDE_95 = 7.814728
 """95 % of the squared, normalized errors of three independent numbers are below it (chi square)."""
+_SMALLEST = 1e-9
+"""No standard deviation is smaller, metres or radians."""
 _SAME_TIME = 1e-3
 """A covariance belongs to the pose whose stamp is so near, seconds."""
 
@@ -175,7 +177,7 @@ def read_covariances(path: Path) -> Covariances:
             values = [float(word) for word in content.split()]
         except ValueError:
             values = []
-        if len(values) != 7 or not all(math.isfinite(value) for value in values):
+        if len(values) != 7 or not all(abs(value) <= LARGEST for value in values):
             raise DatasetError(
                 f"{path}:{number}: expected seven finite numbers `t pxx pxy pxh pyy pyh phh`."
             )
@@ -204,7 +206,7 @@ def _matrices(upper: Array) -> Array:
 def _positive(matrix: Array) -> bool:
     """Whether it is positive definite, whatever the units of its rows."""
     sigmas = np.sqrt(np.maximum(np.diagonal(matrix), 0.0))
-    if not (sigmas > 0).all():
+    if not (sigmas > _SMALLEST).all():
         return False
     correlations = matrix / np.outer(sigmas, sigmas)
     return bool(np.linalg.eigvalsh(correlations)[0] > 0)

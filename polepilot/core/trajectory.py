@@ -19,6 +19,9 @@ from polepilot.core.geometry import Pose2D, wrap_angle
 
 Array = NDArray[np.float64]
 
+LARGEST = 1e12
+"""No time and no place in a file is larger."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
@@ -96,7 +99,8 @@ def read_tum(path: Path) -> Trajectory:
             values = [float(word) for word in content.split()]
         except ValueError:
             values = []
-        if len(values) != 8 or not all(math.isfinite(value) for value in values):
+        # Not infinite, not a number, and not so large that sums of squares are.
+        if len(values) != 8 or not all(abs(value) <= LARGEST for value in values):
             raise DatasetError(
                 f"{path}:{number}: expected eight finite numbers `t x y z qx qy qz qw`."
             )

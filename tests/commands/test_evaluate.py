@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from core.robot.rig import ROOM
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from polepilot.commands.main import run
 from polepilot.core.robot.run_points import read_run, read_targets
@@ -179,3 +181,33 @@ def test_targets_are_told_once(tmp_path: Path) -> None:
     assert read_targets(path).tolist() == [[1, 2], [1, 3], [1, 2]]
     assert np.isfinite(read_targets(path)).all()
     assert math.isclose(read_targets(path)[1, 1], 3.0)
+
+
+@settings(
+    deadline=None, max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(data=st.data())
+def test_damaged_files_are_one_line_of_error_or_a_table(
+    tmp_path: Path, capsys: Captured, data: st.DataObject
+) -> None:
+    write(tmp_path / "truth.tum", 0.0, count=20)
+    write(tmp_path / "estimated.tum", 0.02, count=20)
+    lines = [f"{0.1 * n} 1e-4 0 0 1e-4 0 1e-4\n" for n in range(20)]
+    (tmp_path / "estimated.cov").write_text("".join(lines))
+    (tmp_path / "target.csv").write_text("t,x,y\n0,1,1\n1,2,2\n")
+    path = tmp_path / data.draw(st.sampled_from(sorted(p.name for p in tmp_path.iterdir())))
+    content = bytearray(path.read_bytes())
+    place = data.draw(st.integers(0, len(content) - 1))
+    junk = st.sampled_from([b"nan", b"inf", b"1e308", b"1e-320", b"-", b"\xff", b"\n", b'"', b""])
+    content[place : place + data.draw(st.integers(0, 6))] = data.draw(junk | st.binary(max_size=4))
+    path.write_bytes(bytes(content))
+    words = ["evaluate", str(tmp_path / "estimated.tum"), "--truth", str(tmp_path / "truth.tum")]
+    status = run([*words, "--target", str(tmp_path / "target.csv"), "--align", "se2", "--json"])
+    captured = capsys.readouterr()
+    if status == 0:
+        position = json.loads(captured.out)["trajectories"][0]["position"]
+        assert all(math.isfinite(value) for value in position.values())
+    else:
+        assert status == 2
+        assert captured.err.count("\n") == 1
+        assert captured.out == ""

@@ -15,7 +15,7 @@ from polepilot.core.errors import DatasetError, InputError
 from polepilot.core.localization.localizer import LocalizerSettings
 from polepilot.core.observation import Odometry, PanReading, RangeBearing
 from polepilot.core.robot.dataset import Dataset, Sample, Sighted, in_order
-from polepilot.core.robot.fields import Fields, parse_json
+from polepilot.core.robot.fields import LARGEST, Fields, parse_json
 from polepilot.core.robot.log import LogReader
 from polepilot.core.site import Site, parse_site
 from polepilot.core.trajectory import Trajectory
@@ -160,7 +160,7 @@ def _sighting(fields: Fields) -> Sighted:
 def _triple(fields: Fields, key: str) -> tuple[float, float, float]:
     values = fields.value(key)
     good = isinstance(values, list) and len(values) == 3
-    if not good or not all(isinstance(v, (int, float)) and math.isfinite(v) for v in values):
+    if not good or not all(isinstance(v, int | float) and abs(v) <= LARGEST for v in values):
         raise DatasetError(f"{fields.where}: {key}: expected x, y and heading.")
     return float(values[0]), float(values[1]), float(values[2])
 

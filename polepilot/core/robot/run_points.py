@@ -19,7 +19,7 @@ from polepilot.core.geometry import Point
 from polepilot.core.robot.fields import Fields
 from polepilot.core.robot.run_log import RunLog, find_log
 from polepilot.core.site import parse_site
-from polepilot.core.trajectory import Array, Trajectory, read_tum
+from polepilot.core.trajectory import LARGEST, Array, Trajectory, read_tum
 
 JUDGED = ("estimated", "smoothed", "measured", "deadreckoned")
 """Trajectories that may lie in a run's folder, the most important one first."""
@@ -76,7 +76,7 @@ def read_targets(path: Path) -> Array:
                     _, x, y = (float(word) for word in row)
                 except ValueError:
                     x = y = math.nan
-                if not (math.isfinite(x) and math.isfinite(y)):
+                if not (abs(x) <= LARGEST and abs(y) <= LARGEST):
                     raise DatasetError(f"{path}:{number}: expected three finite numbers `t,x,y`.")
                 places.append((x, y))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
@@ -155,7 +155,7 @@ def _numbers(fields: Fields, key: str, count: int) -> Sequence[float] | None:
     if values is None:
         return None
     good = isinstance(values, list) and len(values) == count
-    if not good or not all(isinstance(v, int | float) and math.isfinite(v) for v in values):
+    if not good or not all(isinstance(v, int | float) and abs(v) <= LARGEST for v in values):
         raise DatasetError(f"{fields.where}: {key}: expected {count} finite numbers.")
     return [float(value) for value in values]
 

@@ -63,7 +63,11 @@ def campaign(
 
 
 def _one(job: tuple[Kind, int], keep: Path, measured: bool, ideal: Sequence[Part]) -> Verdict:
-    return judge(*job, keep, measured=measured, ideal=ideal)
+    try:
+        return judge(*job, keep, measured=measured, ideal=ideal)
+    except Exception as error:
+        error.add_note(f"in the recording {job[0]} {job[1]}")
+        raise
 
 
 def missed(result: dict[str, Any], *, target: bool = False) -> list[str]:

@@ -166,14 +166,14 @@ def coloured(rng: Rng, count: int, spread: float, time: float) -> Floats:
 
 
 def _bursts(rng: Rng, count: int, share: float) -> tuple[Floats, Floats]:
-    """Factors on speed and curvature."""
+    """Factors on speed and curvature: less way, and with it less turning; the front slips little."""
     speed, curvature = np.ones(count), np.ones(count)
     at = float(rng.exponential(3.0))
     while share and at < DURATION:
         lasts = float(rng.uniform(0.5, 1.5))
         part = slice(int(at / STEP), int((at + lasts) / STEP))
         speed[part] -= share
-        curvature[part] += share * rng.choice([-1, 1])
+        curvature[part] += 0.3 * share * rng.choice([-1, 1])
         at += lasts + float(rng.exponential(4.0))
     return speed, curvature
 

@@ -115,15 +115,20 @@ def pictures(log: Path) -> Iterator[Point]:
     """Each picture's R_2^2 and, from the same picture, R_2^3, against the truth."""
     recording = read_run_log(log)
     assert recording.truth is not None
+    camera = recording.camera
     localizer = Localizer(
-        recording.landmarks, recording.vehicle, recording.camera.forward, recording.settings
+        recording.landmarks,
+        recording.vehicle,
+        camera.forward,
+        recording.settings,
+        camera.half_view,
     )
     for sample in recording.samples:
         if isinstance(sample, Odometry):
             localizer.add_odometry(sample)
         if not isinstance(sample, Sighted):
             continue
-        localizer.add_measurements(sample.measurements)
+        localizer.add_picture(sample.stamp, sample.pan, sample.measurements)
         if localizer.status is Status.LOST:
             localizer.refix(localizer.reason)
         estimate, measured = localizer.estimate(sample.stamp), localizer.measured

@@ -166,7 +166,7 @@ def coloured(rng: Rng, count: int, spread: float, time: float) -> Floats:
 
 
 def _bursts(rng: Rng, count: int, share: float) -> tuple[Floats, Floats]:
-    """Factors on speed and curvature: less way, and with it less turning; the front slips little."""
+    """Factors on speed (and with it on turning) and on curvature: the front slips little."""
     speed, curvature = np.ones(count), np.ones(count)
     at = float(rng.exponential(3.0))
     while share and at < DURATION:

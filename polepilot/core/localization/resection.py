@@ -176,6 +176,7 @@ def _by_bearings(
         covariance = np.linalg.inv(information)
     except np.linalg.LinAlgError:
         return _no_tell(agreeing)
+    covariance = 0.5 * (covariance + covariance.T)
     largest = math.sqrt(max(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]), 0.0))
     if not largest <= settings.max_position_sigma:
         return _no_tell(agreeing)

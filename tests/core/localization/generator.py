@@ -18,6 +18,8 @@ from polepilot.core.observation import Odometry, RangeBearing
 STEP = 0.01
 WHEELBASE = 0.20
 FORWARD = 0.10
+HALF_VIEW = math.radians(18.4)
+"""Half of the camera's angle of view; a pole nearer than 1.65 m does not fit into the picture."""
 
 ROOM = [(0.2, 0.2), (4.0, 0.1), (7.8, 0.3), (7.9, 3.1), (7.7, 5.8), (3.9, 5.9), (0.1, 5.7)]
 LOOP = [(1.5, 1.5), (6.3, 1.4), (6.4, 4.5), (4.0, 3.2), (1.6, 4.6)]
@@ -150,7 +152,7 @@ def _look(
         distance = math.hypot(px - cx, py - cy)
         bearing = wrap_angle(math.atan2(py - cy, px - cx) - heading)
         in_image = wrap_angle(bearing - pan)
-        if abs(in_image) > math.radians(18.4) or distance < 1.65:
+        if abs(in_image) > HALF_VIEW or distance < 1.65:
             continue
         sigma = faults.range_share * distance
         if rng.random() < faults.wrong_ids:

@@ -18,6 +18,8 @@ _SIGHTINGS = 6
 """Contradicting sightings before a landmark is judged."""
 _WITNESSED = 3
 """The same where another landmark was in its place before and after them."""
+_KNOWN = 0.03
+"""Metres to which the best of these few must be known."""
 _SPAN = 2.0
 """Seconds between the first and the last of them: more than one pass of the camera."""
 _MEMORY = 60.0
@@ -62,18 +64,23 @@ class LandmarkHealth:
     """Collects where landmarks appear that do not stand where the map has them."""
 
     landmarks: Mapping[int, Landmark]
-    _places: dict[int, deque[tuple[float, Point]]] = field(default_factory=dict)
+    _places: dict[int, deque[tuple[float, Point, float]]] = field(default_factory=dict)
     _agreed: dict[int, int] = field(default_factory=dict)
     moved: dict[int, Point] = field(default_factory=dict)
     """Landmarks found displaced, and by how much; they are not to be used."""
 
-    def contradicted(self, number: int, stamp: float, place: Point) -> Verdict | None:
-        """``number`` appeared at ``place`` while other landmarks agreed with the pose."""
+    def contradicted(
+        self, number: int, stamp: float, place: Point, sigma: float = 0.0
+    ) -> Verdict | None:
+        """``number`` appeared at ``place`` while other landmarks agreed with the pose.
+
+        ``sigma``: how well that place is known, metres.
+        """
         self._agreed.pop(number, None)
         if number in self.moved:
             return None
         places = self._places.setdefault(number, deque(maxlen=24))
-        places.append((stamp, place))
+        places.append((stamp, place, sigma))
         while stamp - places[0][0] > _MEMORY:
             places.popleft()
         if len(places) < _SIGHTINGS or stamp - places[0][0] < _SPAN:
@@ -89,7 +96,9 @@ class LandmarkHealth:
         suspects = [
             number
             for number, places in self._places.items()
-            if number != witness and len(places) >= _WITNESSED
+            if number != witness
+            and len(places) >= _WITNESSED
+            and min(sigma for _, _, sigma in places) <= _KNOWN
         ]
         verdicts = [self._verdict(number) for number in suspects]
         return [verdict for verdict in verdicts if verdict is not None]
@@ -97,9 +106,12 @@ class LandmarkHealth:
     def _verdict(self, number: int) -> Verdict | None:
         """On what was collected, if that agrees on a new place."""
         places = self._places[number]
-        points = np.array([point for _, point in places])
-        middle = np.median(points, axis=0)
-        scatter = float(np.median(np.hypot(*(points - middle).T)))
+        points = np.array([point for _, point, _ in places])
+        apart = np.hypot(*(points - np.median(points, axis=0)).T)
+        scatter = float(np.median(apart))
+        # The surer the pose was, the more a sighting counts.
+        weights = np.array([1.0 / max(sigma, 0.01) ** 2 for _, _, sigma in places])
+        middle = np.average(points, axis=0, weights=weights * (apart <= max(scatter, _SCATTER)))
         mark = self.landmarks[number]
         dx, dy = float(middle[0]) - mark.x, float(middle[1]) - mark.y
         if scatter > _SCATTER or math.hypot(dx, dy) < _SHIFT:

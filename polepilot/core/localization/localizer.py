@@ -396,12 +396,13 @@ class Localizer:
         if gap > settings.tolerance and not misread:
             self._doubt.add(measurement, gap)
         if place is not None and self._others_agree(number, stamp):
-            self._contradicted(number, stamp, place)
+            sigma = math.hypot(_sigma(track), measurement.range * _heading_sigma(track))
+            self._contradicted(number, stamp, place, sigma)
         return False
 
-    def _contradicted(self, number: int, stamp: float, place: Point) -> None:
+    def _contradicted(self, number: int, stamp: float, place: Point, sigma: float) -> None:
         """A landmark is not in its place though the pose is right: is it to be left out?"""
-        verdict = self._health.contradicted(number, stamp, place)
+        verdict = self._health.contradicted(number, stamp, place, sigma)
         if verdict is not None:
             self._tell(verdict, stamp)
 
@@ -471,6 +472,10 @@ class Localizer:
     def _judge(self, track: Track) -> None:
         doubted = self._doubt.spread > 0.0
         self._belief.judge(track.stamp, track.moving, _sigma(track), doubted)
+
+
+def _heading_sigma(track: Track) -> float:
+    return math.sqrt(float(track.filter.pose_covariance[2, 2]))
 
 
 def _sigma(track: Track) -> float:

@@ -15,6 +15,8 @@ _MARGIN = math.radians(4.0)
 """So far inside the picture a landmark must be expected to be looked for."""
 _NEARER = 1.03
 """Nearer than this times the least depth at which a landmark was seen, none is expected."""
+_FARTHER = 1.0
+"""Farther than this times the distance from which it was seen, a landmark is not expected."""
 _PLACE = 0.05
 """Metres: within so much the view is the same, whatever stands in the way."""
 _SURE = 3
@@ -38,6 +40,8 @@ class _Record:
     """Looks in vain since the last sighting."""
     first_missed: float = 0.0
     ever: int = 0
+    farthest: float = 0.0
+    """Metres from which it was seen."""
     hidden: bool = False
 
 
@@ -53,7 +57,7 @@ class Presence:
         self._forward = camera_forward
         self._inside = half_view - _MARGIN
         self._records = {number: _Record() for number in landmarks}
-        self._nearest, self._farthest = math.inf, 0.0
+        self._nearest = math.inf
 
     def forget(self) -> None:
         """The pose was wrong: so is what was expected from it."""
@@ -61,18 +65,23 @@ class Presence:
             record.place, record.missed = (math.inf, math.inf), 0
 
     def expected(self, pose: Pose2D, pan: float) -> list[int]:
-        """Landmarks that stand well inside the picture, at distances at which some were seen."""
+        """Landmarks that stand well inside the picture, as near as they were seen before."""
         x, y = pose.ahead(self._forward)
         offsets = self._points - (x, y)
         direction = pose.heading + pan
         cos, sin = math.cos(direction), math.sin(direction)
         depth = offsets @ (cos, sin)
         aside = offsets @ (-sin, cos)
-        distance = np.hypot(depth, aside)
         inside = np.abs(aside) < math.tan(self._inside) * depth
         # How much of a pole fits into the picture depends on its depth.
-        inside &= (depth > _NEARER * self._nearest) & (distance < self._farthest)
-        return [self._ids[i] for i in np.flatnonzero(inside)]
+        inside &= depth > _NEARER * self._nearest
+        found = []
+        for index in np.flatnonzero(inside).tolist():
+            number = self._ids[index]
+            distance = math.hypot(depth[index], aside[index])
+            if distance < _FARTHER * self._records[number].farthest:
+                found.append(number)
+        return found
 
     def saw(self, number: int, distance: float, off_axis: float, pose: Pose2D) -> bool:
         """``number`` was seen where it should be; True if it was thought hidden.
@@ -82,8 +91,8 @@ class Presence:
             off_axis: bearing in the picture, radians.
         """
         self._nearest = min(self._nearest, distance * math.cos(off_axis))
-        self._farthest = max(self._farthest, distance)
         record = self._records[number]
+        record.farthest = max(record.farthest, distance)
         if math.dist(record.place, pose.position) > _PLACE:
             record.place, record.hits, record.overlooked = pose.position, 0, 0
         else:

@@ -40,6 +40,8 @@ REASONS = (
     "wrong width",
     "cut off",
     "something covers a part",
+    "an end bar is what lies behind it",
+    "it goes on beyond its end",
 )
 """What `Strip.reason` means, in words; the first is a strip that was read."""
 

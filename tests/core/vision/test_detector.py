@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 import pytest
 from vision_scenes import CAMERA, jpeg, photographs, picture, pole, room
 
-from polepilot.core.landmark import SUPPORTED_BITS, LandmarkKind
+from polepilot.core.landmark import SUPPORTED_BITS, LandmarkKind, encode
 from polepilot.core.observation import Detection, Image
 from polepilot.core.sim.render import Look
 from polepilot.core.vision.detector import LandmarkDetector
@@ -109,6 +110,24 @@ def test_jpeg() -> None:
         assert one.range == pytest.approx(away, rel=0.01)
 
 
+def test_far_landmarks_whose_colour_jpeg_has_blurred() -> None:
+    """JPEG keeps one colour for four pixels, and a pale picture has little: brightness tells."""
+    read, errors = 0, []
+    for seed in range(25):
+        rng = np.random.default_rng(seed)
+        ids = [int(number) for number in rng.choice(range(1, 16), 3, replace=False)]
+        ranges = rng.uniform(11.0, 15.0, 3)
+        poles = [pole(*one) for one in zip(ids, ranges, (-0.2, 0.02, 0.22), strict=True)]
+        image = picture(poles, seed).astype(float)
+        pale = 0.6 * image + 0.4 * image.mean(axis=2, keepdims=True)
+        found = ALL.detect(jpeg(np.rint(pale).astype(np.uint8), 85))
+        assert {one.id for one in found} <= set(ids)
+        read += len(found)
+        errors += [abs(one.range / ranges[ids.index(one.id)] - 1) for one in found]
+    assert read >= 0.75 * 75
+    assert np.mean(errors) <= 0.006
+
+
 def test_a_monochrome_camera() -> None:
     look = Look(bright=(0.9, 0.9, 0.9))
     grey = picture([pole(13, 4.0, 0.1)], look=look, walls=room(20.0))[:, :, 1]
@@ -140,6 +159,60 @@ def test_a_covered_segment_is_not_guessed() -> None:
         covered = image.copy()
         covered[first : round(first + unit), 180:220] = (150, 150, 150)
         assert ALL.detect(covered) == [], segment
+
+
+@pytest.mark.parametrize("lighter", [0, 4, 10, 20])
+def test_tape_a_little_wider_than_the_pole_is_not_taken_for_paint(lighter: int) -> None:
+    image = picture([pole(13, 3.0, 0.0)], 1)
+    one = only(image)
+    unit = (one.bottom - one.top) / 13
+    half = 0.7 * unit + 2
+    black = image[round(one.top + 2.5 * unit), round(one.column)].astype(int)
+    for segment in (3, 7, 9):  # the bright ones
+        upper, lower = one.top + segment * unit - 1.5, one.top + (segment + 1) * unit + 1.5
+        taped = image.copy()
+        rows = slice(round(upper), round(lower))
+        taped[rows, round(one.column - half) : round(one.column + half) + 1] = black + lighter
+        assert ALL.detect(taped) == [], segment
+
+
+def post(
+    code: str, unit: int, seed: int, *, longer: int = 0, board: bool = False, bars: bool = True
+) -> Image:
+    """A painted post in front of a grey wall or an orange board.
+
+    Args:
+        code: from top to bottom, "1" for bright.
+        longer: segments of bright paint that follow at either end.
+        bars: whether the two segments at either end are painted at all.
+    """
+    image = np.full((300, 400, 3), (150.0, 155.0, 160.0))
+    if board:
+        image[:, 140:260] = (60.0, 135.0, 225.0)
+    across = (np.arange(400) - 200.0) / (0.7 * unit)
+    inside = np.abs(across) <= 1
+    shade = 0.55 + 0.45 * np.sqrt(np.clip(1 - across[inside] ** 2, 0, 1))
+    places = np.floor((np.arange(300) - (150 - len(code) * unit / 2)) / unit).astype(int)
+    for row, place in enumerate(places):
+        bar = not 2 <= place < len(code) - 2
+        if not -longer <= place < len(code) + longer or (bar and not bars):
+            continue
+        bright = not 0 <= place < len(code) or code[place] == "1"
+        paint = np.array((40.0, 120.0, 235.0) if bright else (20.0, 20.0, 20.0))
+        image[row, inside] = paint * shade[:, None]
+    image = np.asarray(cv2.GaussianBlur(image, (0, 0), 0.6))
+    image += np.random.default_rng(seed).normal(0, 1.2, image.shape)
+    return np.clip(image, 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("number", [1, 2, 12, 15])
+@pytest.mark.parametrize("unit", [8, 10, 12])
+def test_an_end_bar_is_paint_and_ends(number: int, unit: int) -> None:
+    code = encode(number, 4)
+    for board in (False, True):
+        assert only(post(code, unit, unit, board=board)).id == number
+    assert ALL.detect(post(code, unit, unit, longer=5)) == [], "a post that goes on"
+    assert ALL.detect(post(code, unit, unit, board=True, bars=False)) == [], "stripes on a board"
 
 
 def test_a_grey_ladder_is_no_landmark() -> None:

@@ -149,7 +149,7 @@ void eye_match_faint(eye_hits *hits, int x)
             if (eye_colour(column + y * p->stride, hits->task) > EYE_FAINT)
                 end = y;
         int height = end - from + 1;
-        if (from >= p->rows || height > LONGEST || is_known(hits, 0, from, end))
+        if (end == from || from >= p->rows || height > LONGEST || is_known(hits, 0, from, end))
             continue;
         int room = LONGEST - height + BESIDE;
         int top = from < room ? 0 : from - room;

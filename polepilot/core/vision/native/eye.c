@@ -13,6 +13,7 @@
 #define USUAL_BEND 2.1          /* times what the sag's sigma and that pitch allow */
 #define USUAL_TINT 0.17        /* as in eye_strip */
 #define USUAL_SIGMA 0.0040      /* of the unit, as a share of it */
+#define USUAL_DOUBT 1.5         /* rest of an end bar as paint, over its rest as what is behind it */
 #define SURE 6e-4              /* share of the unit: no second fit makes it better */
 #define SHARP 3.3              /* rows per segment: blurred colour still parts them */
 #define FAR 4.0                /* rows per segment: */
@@ -61,10 +62,10 @@ static double most_misfit(const eye_strip *strip)
     int ones = 0;
     for (int bit = 0; bit < strip->bits; bit++)
         ones += strip->id >> bit & 1;
-    /* A code without a gap is a fence: many things are striped evenly. */
-    int fence = ones == strip->bits;
-    double more = strip->unit < FAR && !fence ? MISFIT_A_FAR_BIT : MISFIT_A_BIT;
-    return MOST_MISFIT + more * (ones - 1);
+    /* A code of bright bits alone is not as much evidence: many things are evenly striped. */
+    if (ones == strip->bits)
+        return MOST_MISFIT + MISFIT_A_BIT * (ones - 2);
+    return MOST_MISFIT + (strip->unit < FAR ? MISFIT_A_FAR_BIT : MISFIT_A_BIT) * (ones - 1);
 }
 
 /* What is known as soon as there is a scale. */
@@ -142,6 +143,7 @@ static int examine(const eye_picture *picture, const eye_task *task,
     eye_upright upright;
     eye_scale scale;
     eye_side side;
+    double doubt = 0;
     out->bits = candidate->bits;
     out->column = candidate->column;
     out->row = (candidate->top + candidate->bottom) / 2;
@@ -161,7 +163,14 @@ static int examine(const eye_picture *picture, const eye_task *task,
     reason = eye_fit_side(picture, &upright, half, kind->flat, &side);
     if (reason != EYE_READ)
         return reason;
+    if (candidate->open_top || candidate->open_bottom)
+        reason = eye_look_at_ends(picture, &upright, &scale, &side, candidate, out->code, levels,
+                                  segments, &doubt);
+    if (reason != EYE_READ)
+        return reason;
     if (eye_covered(picture, &upright, &scale, &side, out->code, levels, segments, scale.noise / 2))
+        return EYE_COVERED;
+    if (eye_in_front(picture, task, &upright, &scale, &side, out->code, levels, segments))
         return EYE_COVERED;
     out->side_noise = side.noise;
     out->sides = side.sides;
@@ -172,7 +181,11 @@ static int examine(const eye_picture *picture, const eye_task *task,
     out->unit_sigma = scale.unit_sigma;
     out->sag_sigma = scale.sag_sigma;
     out->column_sigma = side.sigma;
-    return misfit(out, task->constant) > most_misfit(out) ? EYE_POOR_FIT : EYE_READ;
+    double off = misfit(out, task->constant), most = most_misfit(out);
+    if (off > most)
+        return EYE_POOR_FIT;
+    doubt /= USUAL_DOUBT;
+    return off + doubt * doubt > most ? EYE_NO_BAR : EYE_READ;
 }
 
 /* Examines a candidate by its colour and, if that is of no use on a far one, by its brightness: JPEG
@@ -183,7 +196,9 @@ static eye_strip look_closely(const eye_picture *picture, const eye_task *task,
     eye_strip strip = {0}, other = {0};
     double unit = (candidate->bottom - candidate->top) / (2 * candidate->bits + 1);
     strip.reason = examine(picture, task, candidate, 0, &strip);
-    if (strip.reason == EYE_READ || picture->channels == 1 || unit >= SHARP)
+    int sure = strip.reason == EYE_READ || strip.reason == EYE_COVERED ||
+               strip.reason == EYE_NO_BAR || strip.reason == EYE_GOES_ON;
+    if (sure || picture->channels == 1 || unit >= SHARP)
         return strip;
     other.reason = examine(picture, task, candidate, 1, &other);
     return other.reason == EYE_READ ? other : strip;

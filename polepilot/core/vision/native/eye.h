@@ -12,7 +12,9 @@
  *   scale.c    all edges of the code at once, fitted to one scale, by the model in wave.c
  *   read.c     the light of the segments as bits, or why they are none
  *   side.c     where the strip's middle lies between its sides
+ *   ends.c     whether the end bars are there, and end
  *   cover.c    whether something dark lies over it
+ *   front.c    what else speaks for something in front of a bit
  * eye.c runs them; internal.h is what they share. Rows and columns count from the centre of the
  * first pixel. Light is linear, 0 to 1. docs/vision.md explains the method. */
 #ifndef POLEPILOT_EYE_H
@@ -42,7 +44,9 @@ enum eye_reason {
     EYE_UNKNOWN_ID = 10,
     EYE_WRONG_WIDTH = 11,
     EYE_CUT_OFF = 12,
-    EYE_COVERED = 13
+    EYE_COVERED = 13,
+    EYE_NO_BAR = 14,
+    EYE_GOES_ON = 15
 };
 
 typedef struct {

@@ -71,9 +71,16 @@ int eye_read(const eye_task *task, double levels[][3], int segments, int channel
              double width, int open, char *code, double *tint);
 int eye_fit_side(const eye_picture *picture, const eye_upright *upright, double half, int flat,
                  eye_side *out);
+int eye_look_at_ends(const eye_picture *picture, const eye_upright *upright,
+                     const eye_scale *scale, const eye_side *side,
+                     const eye_candidate *candidate, const char *code, double levels[][3],
+                     int segments, double *doubt);
 int eye_covered(const eye_picture *picture, const eye_upright *upright, const eye_scale *scale,
                 const eye_side *side, const char *code, double levels[][3], int segments,
                 double noise);
+int eye_in_front(const eye_picture *picture, const eye_task *task, const eye_upright *upright,
+                 const eye_scale *scale, const eye_side *side, const char *code,
+                 double levels[][3], int segments);
 
 /* ---- numbers ---- */
 

@@ -85,13 +85,17 @@ static int narrow(const float *sum, float segments, float unit, int *low, int n)
     span(sum, *low, n, 2 * unit, 3 * unit, fence);
     for (int i = 0; i < n; i++)
         upper[i] = bar[i] - 2 * fence[i] - least;
+    int first = 0, last = n;
+    while (first < n && upper[first] < 0)
+        first++;
+    if (first == n)
+        return 0;
     span(sum, *low, n, (segments - 2) * unit, segments * unit, bar);
     span(sum, *low, n, (segments - 3) * unit, (segments - 2) * unit, fence);
     for (int i = 0; i < n; i++) {
         float other = bar[i] - 2 * fence[i] - least;
         lower[i] = other < upper[i] ? other : upper[i];
     }
-    int first = 0, last = n;
     while (first < n && lower[first] < 0)
         first++;
     while (last > first && lower[last - 1] < 0)

@@ -1,0 +1,341 @@
+/* What speaks for something in front of a bit that reads dark.
+ *
+ * A landmark's dark segments are painted with one black, and its sides are straight. What covers a
+ * bit has another black, or ends amid the dark rows, or shows beside the pole at just these rows,
+ * with the very light that the bit has. Each of that alone happens without a cover, if rarely, so
+ * they are added up; only what is seen at both sides of the pole is enough by itself. */
+#include "internal.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define ENOUGH 1.7      /* evidence; a piece is hardly ever more than 1 without a cover, */
+#define MOST_OF_ONE 1.5 /* and counts no more than this */
+#define LEAST_UNIT 3.5  /* rows per segment; with fewer there is too little to be seen of a cover */
+#define MOST_ROWS 512   /* of what is beside a side, */
+#define ROWS_A_UNIT 5.0 /* and how many a segment if there are many more */
+#define REACH 0.8       /* segments that it goes on above and below the code */
+#define TILTS 8         /* slopes of what lies aslant, to either side, */
+#define TILT 0.2        /* by so many more segments up or down each */
+#define LEVEL_TILTS 1   /* of them what is seen at one side only may have */
+#define SAME_BOTH 0.015 /* of bright - dark: how much one thing differs on the pole and beside, */
+#define SAME_ONE 0.02
+#define SAME_NOISE 0.2  /* times the fit's rest, more; */
+#define UNLIKE 5.0      /* times as much of SAME_ONE says nothing any more */
+#define STANDS_OUT 0.2  /* from what is above and below, of bright - dark; at both sides, or */
+#define STANDS_OUT_ONE 0.5 /* at one so that nothing is missing */
+#define OTHER_BLACK 0.04   /* of bright - dark, and times the spread of the other dark segments: */
+#define OTHER_SPREAD 3.0
+#define SWELLS 0.45        /* columns by which a side stands out, and times as much elsewhere: */
+#define SWELLS_SPREAD 3.0
+#define BACKGROUND 0.25 /* of bright - dark: least light behind against which a side shows */
+#define STEP 0.06       /* of bright - dark, amid dark rows, and times the usual rest there: */
+#define STEP_SPREAD 4.0
+#define EDGE 1.1        /* rows, and times the blur, that a bright segment's edge lightens */
+#define EDGE_BLUR 2.2
+
+enum { AT, OFF, BEHIND, STRIPS }; /* beside a side: just there, a little off, what stands behind */
+
+static const double from_side[STRIPS] = {0.2, 0.8, 3.2}, to_side[STRIPS] = {1.8, 2.4, 6.2};
+
+/* Light beside one side of a strip, summed up from its first row on. */
+typedef struct {
+    int first, rows, step; /* each the light of one row in so many of the picture */
+    int seen[STRIPS];      /* whether all of it lies in the picture */
+    int from[STRIPS], to[STRIPS]; /* the channels: only what lies a little off is asked for all */
+    float sum[STRIPS][MOST_ROWS + 1][3];
+} margin;
+
+/* What is asked about. */
+typedef struct {
+    const eye_scale *scale;
+    const char *code;
+    double (*levels)[3];
+    int segments, channels;
+    double dark[3], bright[3], contrast;
+    int channel;         /* in which the paint is brightest; of its light in the dark rows */
+    double black, usual; /* the middle one and how far others are from it */
+    margin beside[2];
+} scene;
+
+static double row_of(const scene *s, double place)
+{
+    double off = place - s->segments / 2.0;
+    return s->scale->middle + s->scale->unit * off / (1 + s->scale->sag * off);
+}
+
+/* As floor and ceil, which are slow on a plain x86-64; of numbers that an int can hold. */
+static inline int down(double value)
+{
+    int whole = (int)value;
+    return whole - (whole > value);
+}
+
+static inline int up(double value) { return -down(-value); }
+
+/* The middle one of some values, which are sorted for that. */
+static double middle_of(double *values, int n)
+{
+    for (int i = 1; i < n; i++) {
+        double value = values[i];
+        int at = i;
+        for (; at > 0 && values[at - 1] > value; at--)
+            values[at] = values[at - 1];
+        values[at] = value;
+    }
+    return n > 0 ? (values[(n - 1) / 2] + values[n / 2]) / 2 : 0;
+}
+
+/* The largest difference in any channel, of bright - dark. */
+static double apart(const scene *s, const double *one, const double *other)
+{
+    double most = 0;
+    for (int c = 0; c < s->channels; c++)
+        most = fmax(most, fabs(one[c] - other[c]));
+    return most / s->contrast;
+}
+
+static double at_most(double evidence) { return eye_limit(evidence, 0, MOST_OF_ONE); }
+
+static void fill_margin(const eye_picture *p, const eye_upright *u, const eye_side *side,
+                        const scene *s, int low, int sign, margin *out)
+{
+    double half = (s->segments / 2.0 + REACH) * s->scale->unit;
+    int last = (int)fmin(floor(s->scale->middle + half), p->rows - 1);
+    out->first = (int)fmax(ceil(s->scale->middle - half), 0);
+    out->step = (int)fmax(s->scale->unit / ROWS_A_UNIT, 1);
+    if (last - out->first >= out->step * MOST_ROWS)
+        out->step = (last - out->first) / MOST_ROWS + 1;
+    out->rows = last < out->first ? 0 : (last - out->first) / out->step + 1;
+    for (int k = 0; k < STRIPS; k++) {
+        int all = k == OFF || low < 0 || p->channels < 3;
+        out->from[k] = all ? 0 : low;
+        out->to[k] = all ? p->channels - 1 : low;
+        out->seen[k] = 1;
+        memset(out->sum[k][0], 0, sizeof out->sum[k][0]);
+    }
+    for (int r = 0; r < out->rows; r++) {
+        int y = out->first + r * out->step;
+        double edge = side->column + u->lean * (y - u->row) + sign * side->half;
+        const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
+        for (int k = 0; k < STRIPS; k++) {
+            int from = up(edge + (sign > 0 ? from_side[k] : -to_side[k]));
+            int to = down(edge + (sign > 0 ? to_side[k] : -from_side[k]));
+            float part = 1 / (float)(to - from + 1);
+            if (from < 0 || to >= p->columns)
+                out->seen[k] = 0;
+            for (int c = out->from[k]; c <= out->to[k]; c++) {
+                float light = 0;
+                for (int x = from; x <= to && out->seen[k]; x++)
+                    light += eye_linear(row[x * p->channels + c]);
+                out->sum[k][r + 1][c] = out->sum[k][r][c] + light * part;
+            }
+        }
+    }
+}
+
+/* Mean light between two rows, in the strip's channels; 0 where they are not to be seen. */
+static int light_between(const margin *of, int strip, double from, double to, double *light)
+{
+    double first = (from - of->first) / of->step, last = (to - of->first) / of->step;
+    int a = up(first), b = down(last);
+    if (b < a)
+        a = b = down((first + last) / 2 + 0.5);
+    if (a < 0 || b >= of->rows || !of->seen[strip])
+        return 0;
+    for (int c = of->from[strip]; c <= of->to[strip]; c++)
+        light[c] = (of->sum[strip][b + 1][c] - of->sum[strip][a][c]) / (float)(b - a + 1);
+    return 1;
+}
+
+/* How much the light beside bit ``i``, ``shift`` segments lower, differs from the bit's, and by how
+ * much it stands out from what is beside the ends of the dark run ``from`` to ``to``. 0 where that
+ * is not to be seen, or where it differs by more than ``most``. A cover that leaves a code hides no
+ * bright segment by halves: it ends within the run. */
+static int look_beside(const scene *s, int way, int i, int from, int to, double shift,
+                       double most, double *unlike, double *out)
+{
+    double above[3], below[3], at[3];
+    const margin *of = s->beside + way;
+    double top = from + shift, bottom = to + shift, bit = i + shift;
+    if (!light_between(of, OFF, row_of(s, bit + 0.1), row_of(s, bit + 0.9), at))
+        return 0;
+    *unlike = apart(s, at, s->levels[i]);
+    if (*unlike > most ||
+        !light_between(of, OFF, row_of(s, top - 1), row_of(s, top - 0.15), above) ||
+        !light_between(of, OFF, row_of(s, bottom + 0.15), row_of(s, bottom + 1), below))
+        return 0;
+    *out = fmin(apart(s, above, s->levels[i]), apart(s, below, s->levels[i]));
+    return 1;
+}
+
+/* Whether the bit goes on at both sides of the pole, and ends: evidence. */
+static double goes_on(const scene *s, int i, int from, int to)
+{
+    double noise = SAME_NOISE * s->scale->noise, one = SAME_ONE + noise, both = SAME_BOTH + noise;
+    double most = 0;
+    int same[2][2 * TILTS + 1] = {{0}};
+    for (int way = 0; way < 2; way++)
+        for (int k = -TILTS; k <= TILTS; k++) {
+            double unlike, out;
+            if (!look_beside(s, way, i, from, to, TILT * k, UNLIKE * one, &unlike, &out) ||
+                out < STANDS_OUT)
+                continue;
+            same[way][k + TILTS] = unlike < both && out > 3 * both;
+            if (abs(k) <= LEVEL_TILTS)
+                most = fmax(most, fmin(out / STANDS_OUT_ONE, 1) * one / fmax(unlike, one / 2));
+        }
+    /* A straight thing lies as much higher on one side as it lies lower on the other. */
+    for (int k = 0; k <= 2 * TILTS; k++)
+        if (same[0][k] && same[1][2 * TILTS - k])
+            return ENOUGH + 1;
+    return at_most(most);
+}
+
+/* Whether the bit's black is another one than that of the other dark segments: evidence. Of colour
+ * the middle channel is asked, which every camera and JPEG keep best. */
+static double other_black(const scene *s, int i)
+{
+    double values[EYE_MOST_SEGMENTS];
+    int n = 0, channel = s->channels == 3 ? 1 : 0;
+    for (int k = 2; k < s->segments - 2; k++)
+        if (s->code[k] == '0' && abs(k - i) > 1)
+            values[n++] = s->levels[k][channel];
+    if (n < 3)
+        return 0;
+    double middle = middle_of(values, n);
+    double spread = fmax(values[n - 1] - middle, middle - values[0]) / s->contrast;
+    double off = fabs(s->levels[i][channel] - middle) / s->contrast;
+    return at_most(off / (OTHER_BLACK + OTHER_SPREAD * spread));
+}
+
+/* Whether a side stands out where the bit is, and at no bright segment: evidence. In the channel in
+ * which the paint is darkest, bright and dark segments have the same sides. */
+static double swells(const scene *s, const eye_task *task, int i, int from, int to)
+{
+    double width[EYE_MOST_SEGMENTS], values[EYE_MOST_SEGMENTS], most = 0;
+    double trim = eye_limit(0.5 - 0.6 / s->scale->unit, 0.1, 0.3);
+    if (s->channels != 3 || task->low < 0)
+        return 0;
+    for (int way = 0; way < 2; way++) {
+        int n = 0;
+        double elsewhere = 0;
+        for (int k = 0; k < s->segments; k++) {
+            double at[3], behind[3], upper = row_of(s, k + trim), lower = row_of(s, k + 1 - trim);
+            width[k] = NAN;
+            if (!light_between(s->beside + way, AT, upper, lower, at) ||
+                !light_between(s->beside + way, BEHIND, upper, lower, behind))
+                continue;
+            double room = behind[task->low] - s->dark[task->low];
+            if (room < BACKGROUND * s->contrast)
+                continue;
+            width[k] = (to_side[AT] - from_side[AT]) * (behind[task->low] - at[task->low]) / room;
+            values[n++] = width[k];
+        }
+        if (n < s->segments - 2 || isnan(width[i]))
+            continue;
+        double usual = middle_of(values, n);
+        for (int k = 0; k < s->segments; k++)
+            if ((k < from || k >= to) && !isnan(width[k]))
+                elsewhere = fmax(elsewhere, fabs(width[k] - usual));
+        most = fmax(most, (width[i] - usual) / fmax(SWELLS, SWELLS_SPREAD * elsewhere));
+    }
+    return at_most(most);
+}
+
+/* The light of the dark rows, off the bright segments' edges, in the run from ``from`` to ``to`` or
+ * (both 0) in all of them. */
+static int dark_rows(const scene *s, const eye_upright *u, int channel, int from, int to,
+                     double *values)
+{
+    double keep = EDGE + EDGE_BLUR * s->scale->blur;
+    int n = 0, r = 0;
+    for (int i = 2, e; i < s->segments - 2; i = e) {
+        for (e = i; e < s->segments - 2 && s->code[e] == s->code[i]; e++)
+            ;
+        if (s->code[i] == '1' || (to > 0 && (i != from || e != to)))
+            continue;
+        double upper = row_of(s, i) + keep, lower = row_of(s, e) - keep;
+        for (; r < u->rows && u->first + r * u->bin + 0.5 <= upper; r++)
+            ;
+        for (; r < u->rows && u->first + (r + 1) * u->bin - 0.5 < lower; r++)
+            values[n++] = u->channel[r][channel];
+    }
+    return n;
+}
+
+/* What is usual in the dark rows; 0 where there are hardly any. */
+static int know_dark_rows(scene *s, const eye_upright *u)
+{
+    double values[EYE_MOST_ROWS];
+    int n = dark_rows(s, u, s->channel, 0, 0, values);
+    if (n < 3)
+        return 0;
+    s->black = middle_of(values, n);
+    for (int i = 0; i < n; i++)
+        values[i] = fabs(values[i] - s->black);
+    s->usual = 1.48 * middle_of(values, n);
+    return 1;
+}
+
+/* Whether there is something brighter amid the run of dark rows: evidence. */
+static double step(const scene *s, const eye_upright *u, int from, int to)
+{
+    double values[EYE_MOST_ROWS], most = 0, room = s->bright[s->channel] - s->black;
+    int n = dark_rows(s, u, s->channel, from, to, values);
+    for (int i = 0; i < n; i++)
+        most = fmax(most, values[i] - s->black);
+    return room > 0 ? at_most(most / (STEP * room + STEP_SPREAD * s->usual)) : 0;
+}
+
+/* Whether something stands in front of a bit that reads dark. */
+int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *u,
+                 const eye_scale *scale, const eye_side *side, const char *code,
+                 double levels[][3], int segments)
+{
+    scene s; /* all but large tables set here */
+    s.scale = scale;
+    s.code = code;
+    s.levels = levels;
+    s.segments = segments;
+    s.channels = p->channels;
+    s.channel = p->channels == 3 ? task->high : 0;
+    s.contrast = 0;
+    double values[EYE_MOST_SEGMENTS];
+    for (int c = 0; c < p->channels; c++) {
+        int n = 0;
+        for (int i = 2; i < segments - 2; i++)
+            if (code[i] == '0')
+                values[n++] = levels[i][c];
+        s.dark[c] = middle_of(values, n);
+        s.bright[c] = (levels[0][c] + levels[1][c] + levels[segments - 2][c] +
+                       levels[segments - 1][c]) / 4;
+        s.contrast = fmax(s.contrast, s.bright[c] - s.dark[c]);
+    }
+    int filled = 0, rows = 0;
+    if (s.contrast <= 0 || scale->unit < LEAST_UNIT)
+        return 0;
+    for (int i = 3; i < segments - 3; i += 2) {
+        if (code[i] == '1')
+            continue;
+        if (!filled) {
+            for (int way = 0; way < 2; way++)
+                fill_margin(p, u, side, &s, task->low, way ? 1 : -1, s.beside + way);
+            rows = know_dark_rows(&s, u);
+            filled = 1;
+        }
+        int from = i, to = i + 1;
+        while (code[from - 1] == '0')
+            from--;
+        while (code[to] == '0')
+            to++;
+        double evidence = goes_on(&s, i, from, to) + other_black(&s, i) +
+                          (rows ? step(&s, u, from, to) : 0);
+        if (evidence <= ENOUGH && evidence + MOST_OF_ONE > ENOUGH)
+            evidence += swells(&s, task, i, from, to);
+        if (evidence > ENOUGH)
+            return 1;
+    }
+    return 0;
+}

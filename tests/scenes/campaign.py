@@ -17,7 +17,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, get_args
@@ -26,7 +26,7 @@ import cv2
 import numpy as np
 from scenes.truth import Family, Scene, Truth
 
-from polepilot.core.landmark import LandmarkKind
+from polepilot.core.landmark import LandmarkKind, recommended_ids
 from polepilot.core.observation import Detection, Image
 from polepilot.core.vehicle import Camera
 from polepilot.core.vision.detector import Detector, LandmarkDetector
@@ -34,6 +34,8 @@ from polepilot.core.vision.measure import column_of
 from polepilot.core.vision.paper import PaperDetector
 
 KINDS = {number: LandmarkKind() for number in range(1, 16)}
+APART = {number: LandmarkKind() for number in recommended_ids(4)}
+"""The ids that are offered: no two of them differ in one segment only."""
 CAMERA = Camera()
 NEAR = 8.0
 """Pixels between an answer and the landmark that it reads, at most."""
@@ -223,7 +225,9 @@ def picture(program: str, family: Family, seed: int, keep: Path | None) -> Scene
 
 @cache
 def _detector(name: str) -> Detector:
-    return PaperDetector(CAMERA, KINDS) if name == "paper" else LandmarkDetector(CAMERA, KINDS)
+    if name == "paper":
+        return PaperDetector(CAMERA, KINDS)
+    return LandmarkDetector(CAMERA, APART if name == "apart" else KINDS)
 
 
 def look(
@@ -235,6 +239,8 @@ def look(
     start = time.perf_counter()
     answers = _detector(detector).detect(scene.image)
     seconds = time.perf_counter() - start
+    if detector == "apart":
+        scene, answers = _without_others(scene, answers)
     marks = match(answers, scene.truths, CAMERA)
     missed = any(
         index not in marks.read and not truth.hidden for index, truth in enumerate(scene.truths)
@@ -244,6 +250,15 @@ def look(
         name = f"{family}-{seed:06d}{'-wrong' * bool(marks.wrong)}{'-false' * bool(marks.false)}"
         cv2.imwrite(str(misses / f"{name}.png"), annotated(scene, marks))
     return judge(scene, marks, seconds)
+
+
+def _without_others(scene: Scene, answers: list[Detection]) -> tuple[Scene, list[Detection]]:
+    """Without the landmarks that would not stand on a site with the ids `APART`."""
+    there = tuple(truth for truth in scene.truths if truth.id in APART)
+    others = [truth for truth in scene.truths if truth.id not in APART]
+    taken = match(answers, others, CAMERA).wrong
+    kept = [one for one in answers if not any(one is other for other, _ in taken)]
+    return replace(scene, truths=there), kept
 
 
 def figures(readings: Iterable[Reading]) -> dict[str, Any]:
@@ -394,7 +409,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--frames", type=int, default=100, help="per family")
     parser.add_argument("--seed", type=int, default=0, help="of the first picture")
     parser.add_argument("--families", nargs="+", choices=get_args(Family), default=get_args(Family))
-    parser.add_argument("--detector", choices=("default", "paper"), default="default")
+    parser.add_argument("--detector", choices=("default", "paper", "apart"), default="default")
     parser.add_argument("--json", type=Path, help="file for the figures")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--save-misses", type=Path, help="folder for annotated pictures")

@@ -81,8 +81,9 @@ def _cell(line: final.Line, result: final.Result | None, judged: bool = False) -
 def _counts(result: final.Result | None) -> str:
     if result is None:
         return ""
-    counts = ", ".join(f"{row['frames']} {family}" for family, row in result.items())
-    landmarks = sum(row["landmarks"] for row in result.values())
+    rows = {family: row for family, row in result.items() if family != final.APART}
+    counts = ", ".join(f"{row['frames']} {family}" for family, row in rows.items())
+    landmarks = sum(row["landmarks"] for row in rows.values())
     return f"\n\nPictures: {counts}; {landmarks} whole landmarks in them."
 
 

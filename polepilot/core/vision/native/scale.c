@@ -8,7 +8,7 @@
 #include <string.h>
 
 #define ROUNDS 8
-#define SETTLED 0.02      /* rows by which boundaries still move when a fit may end */
+#define SETTLED 0.06      /* rows by which boundaries still move when a fit may end */
 #define BLUR_GUESS 0.55   /* rows */
 #define BLUR_PRIOR 0.4    /* rows by which blur may differ from that, about */
 #define LEAST_BLUR 0.2    /* rows */

@@ -14,7 +14,7 @@
 #define FINE_CELLS 24 /* and for its mean height */
 #define SHOWS 5.0     /* times the blur: light does not reach farther */
 #define ROUNDS 6
-#define SETTLED 0.015 /* columns by which the middle still moves when a fit may end */
+#define SETTLED 0.04    /* columns by which the middle still moves when a fit may end */
 #define MARGIN 3.0    /* columns that take part beside a strip a quarter wider than expected */
 #define LEAST_COLUMNS 3
 #define LEAST_PEAK 0.002 /* light */
@@ -152,7 +152,7 @@ static void compare(const eye_upright *u, const double *guess, double half, doub
                     int from, int to, equations *out)
 {
     double row[PARAMETERS], zone[3] = {0};
-    int size[3] = {0}, cells = eye_clamp((int)(2 * half), FEWEST_CELLS, MOST_CELLS);
+    int size[3] = {0}, cells = eye_clamp((int)(1.5 * half), FEWEST_CELLS, MOST_CELLS);
     memset(out->normal, 0, sizeof out->normal);
     memset(out->right, 0, sizeof out->right);
     for (int i = from; i < to; i++) {

@@ -38,7 +38,7 @@ class Belief:
 
     def doubt(self, stamp: float, reason: str) -> None:
         """DEGRADED; the first reason stays."""
-        if self.status is not Status.DEGRADED:
+        if self.status is Status.TRACKING:
             self._set(stamp, Status.DEGRADED, reason)
 
     def judge(self, stamp: float, moving: float, sigma: float, doubted: bool) -> None:

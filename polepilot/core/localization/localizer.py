@@ -17,7 +17,7 @@ from itertools import groupby
 from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.landmark import Landmark
 from polepilot.core.localization.belief import Belief
-from polepilot.core.localization.doubt import Doubt, largest_sigma
+from polepilot.core.localization.doubt import Doubt, Trial, largest_sigma
 from polepilot.core.localization.ekf import PoseFilter
 from polepilot.core.localization.events import EventLog
 from polepilot.core.localization.events import LocalizerEvent as LocalizerEvent
@@ -79,6 +79,7 @@ class Localizer:
             None if half_view is None else Presence(self._landmarks, camera_forward, half_view)
         )
         self._doubt = Doubt(self.settings.tolerance, self.settings.method == "paper")
+        self._trial = Trial()
         self._filter: Filter = (
             RadialFilter(vehicle.wheelbase, camera_forward)
             if self.settings.method == "paper"
@@ -216,7 +217,8 @@ class Localizer:
         if len(self._landmarks) - len(self._health.moved) < 2:
             # With so few left, it is as likely that the pose was wrong.
             self._health.moved.clear()
-        against = list(self._doubt.against)
+        against = sorted({*self._trial.against, *self._doubt.against}, key=lambda m: m.stamp)
+        self._trial.begin(())
         self._doubt.clear()
         self._last_agreed.clear()
         self._health.forget()
@@ -261,7 +263,7 @@ class Localizer:
                 self._agreeing += 1
             elif gap > self.settings.tolerance:
                 self._agreeing = 0
-        if self._agreeing < _RESUMING:
+        if self._agreeing < _RESUMING or _sigma(track) > self.settings.degraded_sigma:
             return False
         track.moving = 0.0
         self._accept(track, stamp, {m.landmark for m in picture})
@@ -296,6 +298,7 @@ class Localizer:
         lags = (self._history.speed_lag, self._history.steering_lag)
         self._before = (stamp, self._filter, lags)
         self._accept(track, stamp, found.landmarks)
+        self._trial.begin(found.landmarks)
         self._measured = (stamp, found.pose)
         ids = ", ".join(str(number) for number in found.landmarks)
         code = "refixed" if self._fixes else "fixed"
@@ -382,6 +385,7 @@ class Localizer:
         if taken:
             self._last_agreed[number] = stamp
             health.agreed(number)
+            self._trial.agrees(number)
             if gap < 0.5 * settings.tolerance:
                 for verdict in health.witnessed(number):
                     self._tell(verdict, stamp)
@@ -395,6 +399,9 @@ class Localizer:
         misread = place is not None and health.stands_another(number, place)
         if gap > settings.tolerance and not misread:
             self._doubt.add(measurement, gap)
+        reason = "" if misread else self._trial.contradicts(measurement)
+        if reason:
+            self._belief.lose(stamp, reason)
         if place is not None and self._others_agree(number, stamp):
             sigma = math.hypot(_sigma(track), measurement.range * _heading_sigma(track))
             self._contradicted(number, stamp, place, sigma)

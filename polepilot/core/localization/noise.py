@@ -23,7 +23,7 @@ class NoiseModel:
     steering_noise: float = math.radians(0.3)
     servo_lag_prior: float = 0.06
     motor_lag_prior: float = 0.05
-    servo_doubt: float = 0.022
+    servo_doubt: float = 0.08
     """Density of the modelled wheel angle's error while the servo is on its way, as a share of
     the way that is left."""
     motor_doubt: float = 0.045

@@ -1,6 +1,7 @@
 """Sites as GeoJSON: a FeatureCollection in local metres, a ``role`` property per feature.
 
 Roles: ``boundary`` (Polygon; its holes are islands), ``island`` (Polygon), ``wall`` (LineString),
+``no_go`` (Polygon),
 ``landmark`` (Point, properties id and what differs from the usual kind), ``route`` (LineString or
 Point, property name), ``start`` (Point, property heading). Other properties and members are left
 alone, as RFC 7946 asks; a third coordinate (height) is not used.
@@ -18,6 +19,7 @@ _GEOMETRY = {
     "boundary": ("Polygon",),
     "island": ("Polygon",),
     "wall": ("LineString",),
+    "no_go": ("Polygon",),
     "landmark": ("Point",),
     "route": ("LineString", "Point"),
     "start": ("Point",),
@@ -37,7 +39,7 @@ def from_geojson(document: dict[str, Any], source: str) -> dict[str, Any]:
     """
     reader = Reader(source)
     features = document.get("features") if document["type"] != "Feature" else [document]
-    site: dict[str, Any] = {"islands": [], "walls": [], "landmarks": [], "routes": []}
+    site: dict[str, Any] = {key: [] for key in ("islands", "walls", "no_go", "landmarks", "routes")}
     if "name" in document:
         site["name"] = document["name"]
     for index, feature in enumerate(reader.array(features, "features", "a list of features")):
@@ -70,10 +72,11 @@ def _add(site: dict[str, Any], feature: Any, field: str, reader: Reader) -> None
             raise reader.refuse(field, "is a second boundary: expected one.")
         site["boundary"], *holes = coordinates or [[]]
         site["islands"] += holes
-    elif role == "island":
+    elif role in ("island", "no_go"):
         if len(coordinates) != 1:
-            raise reader.refuse(field, "is an island with holes: expected one ring.")
-        site["islands"].append(coordinates[0])
+            what = "an island" if role == "island" else "a no-go area"
+            raise reader.refuse(field, f"is {what} with holes: expected one ring.")
+        site["islands" if role == "island" else "no_go"].append(coordinates[0])
     elif role == "wall":
         site["walls"].append(coordinates)
     elif role == "landmark":
@@ -108,6 +111,7 @@ def to_geojson(site: dict[str, Any]) -> dict[str, Any]:
     features = [_feature("boundary", "Polygon", [_closed(site["boundary"])])]
     features += [_feature("island", "Polygon", [_closed(ring)]) for ring in site.get("islands", ())]
     features += [_feature("wall", "LineString", wall) for wall in site.get("walls", ())]
+    features += [_feature("no_go", "Polygon", [_closed(ring)]) for ring in site.get("no_go", ())]
     for mark in site.get("landmarks", ()):
         kind = {key: mark[key] for key in _LANDMARK_KEYS if key in mark}
         features.append(_feature("landmark", "Point", [mark["x"], mark["y"]], **kind))

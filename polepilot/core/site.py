@@ -1,4 +1,4 @@
-"""The drawn map: boundary, islands, walls, landmarks, routes, start. Metres in `map`."""
+"""The drawn map: boundary, islands, walls, no-go areas, landmarks, routes, start. Metres, `map`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from polepilot.core.site_file import Reader, place
 
 LARGEST_FILE = 50_000_000
 """Bytes that a site file may have."""
-_KEYS = ("name", "boundary", "islands", "walls", "landmarks", "routes", "start")
+_KEYS = ("name", "boundary", "islands", "walls", "no_go", "landmarks", "routes", "start")
 _LANDMARK_KEYS = ("id", "x", "y", "bits", "segment", "diameter", "shape")
 
 
@@ -55,6 +55,8 @@ class Site:
     name: str = ""
     islands: tuple[Polyline, ...] = ()
     walls: tuple[Polyline, ...] = ()
+    no_go: tuple[Polyline, ...] = ()
+    """Floor that is not to be driven on, as rings. They hide nothing from the camera."""
     landmarks: tuple[Landmark, ...] = ()
     routes: tuple[Route, ...] = ()
     start: Start | None = None
@@ -62,17 +64,19 @@ class Site:
     """What was mended while reading, for the user to see."""
 
     def floor(self) -> Polygon | MultiPolygon:
-        """The boundary's inside without the islands. Walls have no inside and are not cut out."""
-        return shapely.difference(
-            Polygon(self.boundary), shapely.union_all([Polygon(ring) for ring in self.islands])
-        )
+        """Where one may drive: the boundary's inside without the islands and the no-go areas.
+
+        Walls have no inside and are not cut out.
+        """
+        closed = [Polygon(ring) for ring in (*self.islands, *self.no_go)]
+        return shapely.difference(Polygon(self.boundary), shapely.union_all(closed))
 
     def obstacles(self) -> shapely.Geometry:
-        """Everything that must not be touched: boundary line, islands, walls."""
+        """Everything that must not be touched: boundary line, islands, walls, no-go areas."""
         return shapely.union_all(
             [
                 LineString([*self.boundary, self.boundary[0]]),
-                *(Polygon(ring) for ring in self.islands),
+                *(Polygon(ring) for ring in (*self.islands, *self.no_go)),
                 *(LineString(wall) for wall in self.walls),
             ]
         )
@@ -120,6 +124,8 @@ class Site:
             "landmarks": landmarks,
             "routes": [{"name": r.name, "nodes": [list(p) for p in r.nodes]} for r in self.routes],
         }
+        if self.no_go:
+            document["no_go"] = [[list(p) for p in ring] for ring in self.no_go]
         if self.start is not None:
             start = [self.start.x, self.start.y]
             document["start"] = start + ([] if self.start.heading is None else [self.start.heading])
@@ -176,6 +182,7 @@ def parse_site(document: Any, source: str) -> Site:
     boundary = reader.ring(fields["boundary"], "boundary")
     islands = tuple(reader.ring(v, f) for f, v in entries("islands", "a list of rings"))
     walls = tuple(reader.line(v, f, 2) for f, v in entries("walls", "a list of lines"))
+    no_go = tuple(reader.ring(v, f) for f, v in entries("no_go", "a list of rings"))
     landmarks = tuple(_landmark(v, f, reader) for f, v in entries("landmarks", "a list"))
     routes = tuple(_route(v, f, reader) for f, v in entries("routes", "a list of routes"))
     start = _start(fields["start"], reader) if "start" in fields else None
@@ -183,11 +190,13 @@ def parse_site(document: Any, source: str) -> Site:
     _check_unique([route.name for route in routes], "routes", "name", reader)
     _check_islands(boundary, islands, reader)
     _check_walls(boundary, walls, reader)
+    _check_no_go(boundary, islands, no_go, reader)
     site = Site(
         boundary=boundary,
         name=reader.text(fields.get("name", ""), "name"),
         islands=islands,
         walls=walls,
+        no_go=no_go,
         landmarks=landmarks,
         routes=routes,
         start=start,
@@ -197,7 +206,7 @@ def parse_site(document: Any, source: str) -> Site:
         raise reader.refuse(
             "start",
             f"{place(start.position)} is not on the floor: expected a place inside the boundary "
-            "and outside the islands.",
+            "and outside the islands and the no-go areas.",
             start.position,
         )
     return site
@@ -307,3 +316,21 @@ def _check_walls(boundary: Polyline, walls: tuple[Polyline, ...], reader: Reader
             reader.repairs.append(
                 f"walls[{index}]: lies outside the boundary at {place(wall[0])}; no floor is there."
             )
+
+
+def _check_no_go(
+    boundary: Polyline, islands: tuple[Polyline, ...], no_go: tuple[Polyline, ...], reader: Reader
+) -> None:
+    """Refuses no-go areas that leave nothing to drive on; says which of them change nothing."""
+    if not no_go:
+        return
+    room = Polygon(boundary).difference(shapely.union_all([Polygon(ring) for ring in islands]))
+    areas = [Polygon(ring) for ring in no_go]
+    for index, area in enumerate(areas):
+        if room.intersection(area).area < 1e-9:
+            reader.repairs.append(
+                f"no_go[{index}]: lies outside the floor at {place(no_go[index][0])}; "
+                "it changes nothing."
+            )
+    if room.difference(shapely.union_all(areas)).area < 1e-4:
+        raise reader.refuse("no_go", "leaves no floor inside the boundary.", no_go[0][0])

@@ -99,10 +99,13 @@ class Reader:
         raw = self.array(value, field, "a list of points [x, y]")
         points = [self.point(entry, f"{field}[{index}]") for index, entry in enumerate(raw)]
         kept = points[:1]
+        dropped = []
         for point in points[1:]:
-            if not same(point, kept[-1]):
+            if same(point, kept[-1]):
+                dropped.append(point)
+            else:
                 kept.append(point)
-        self._say_dropped(field, len(points) - len(kept))
+        self._say_dropped(field, dropped)
         if len(kept) < least:
             raise self.refuse(
                 field,
@@ -119,10 +122,9 @@ class Reader:
         if len(raw) < 3:
             raise self.refuse(field, f"has {len(raw)} points: expected at least 3.")
         points = list(self.line(raw, field, 3))
-        dropped = 0
+        dropped = []
         while len(points) > 3 and same(points[0], points[-1]):
-            points.pop()
-            dropped += 1
+            dropped.append(points.pop())
         self._say_dropped(field, dropped)
         points = self._simple(points, field)
         area = signed_area(points)
@@ -132,10 +134,16 @@ class Reader:
             )
         return tuple(points if area > 0 else points[::-1])
 
-    def _say_dropped(self, field: str, dropped: int) -> None:
-        if dropped:
-            doubled = "a repeated point was" if dropped == 1 else f"{dropped} repeated points were"
-            self.repairs.append(f"{field}: {doubled} dropped.")
+    def _say_dropped(self, field: str, dropped: list[Point]) -> None:
+        if not dropped:
+            return
+        where = place(dropped[0])
+        if len(dropped) == 1:
+            self.repairs.append(f"{field}: a repeated point at {where} was dropped.")
+        else:
+            self.repairs.append(
+                f"{field}: {len(dropped)} repeated points were dropped, the first at {where}."
+            )
 
     def _simple(self, points: list[Point], field: str) -> list[Point]:
         """The ring, mended where it touches itself in a point; refused where it crosses itself."""

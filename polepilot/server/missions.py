@@ -415,8 +415,8 @@ def _parse(row: SiteRow) -> Site:
 
 def _same_surroundings(a: SiteRow, b: SiteRow) -> bool:
     """Whether nothing has changed that the robot localizes by or must not touch."""
-    keys = ("boundary", "islands", "walls", "landmarks")
-    return all(a.document.get(key) == b.document.get(key) for key in keys)
+    keys = ("boundary", "islands", "walls", "no_go", "landmarks")
+    return all((a.document.get(key) or []) == (b.document.get(key) or []) for key in keys)
 
 
 def _mission_active() -> RefusedError:

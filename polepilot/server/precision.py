@@ -62,7 +62,7 @@ def compute(job: dict[str, Any]) -> dict[str, Any]:
     resolution = job["resolution"]
     if resolution is None and job["detail"] == "fine":
         resolution = fine_resolution(site)
-    key = (site.boundary, site.islands, site.walls, sweep, resolution)
+    key = (site.boundary, site.islands, site.walls, site.no_go, sweep, resolution)
     field = _fields.get(key)
     if field is None:
         field = _fields[key] = PrecisionField(site, sweep, resolution)

@@ -128,6 +128,8 @@ class SiteDocument(Model):
     boundary: list[Place]
     islands: list[list[Place]] = []
     walls: list[list[Place]] = []
+    no_go: list[list[Place]] = []
+    """Floor that is not to be driven on; landmarks are seen across it."""
     landmarks: list[LandmarkDocument] = []
     routes: list[RouteDocument] = []
     start: StartPlace | None = None

@@ -112,7 +112,7 @@ def test_refused_with_the_place(document: Any, where: tuple[float, float]) -> No
 def test_repeated_points_are_dropped_and_said() -> None:
     site = parse_site({"boundary": [[0, 0], [0, 0], [4, 0], [4, 4], [0, 4], [0, 0]]}, "s")
     assert len(site.boundary) == 4
-    assert site.repairs == ("boundary: a repeated point was dropped.",)
+    assert site.repairs == ("boundary: a repeated point at (0.00, 0.00) was dropped.",)
 
 
 @pytest.mark.parametrize(
@@ -135,6 +135,42 @@ def test_overlaps_are_kept_and_said() -> None:
     assert any("reaches over the boundary" in repair for repair in site.repairs)
     assert any("islands[0] and islands[1]: overlap" in repair for repair in site.repairs)
     assert site.floor().area < 16
+
+
+def test_no_go_areas_are_floor_to_see_across_but_not_to_drive_on() -> None:
+    carpet = [[1, 1], [1, 3], [3, 3], [3, 1]]
+    site = parse_site({"boundary": SQUARE, "no_go": [carpet], "landmarks": [mark(x=2, y=2)]}, "s")
+    assert site.repairs == ()
+    assert Polygon(site.no_go[0]).exterior.is_ccw
+    assert site.floor().area == pytest.approx(12)
+    assert len(site.segments()) == 4
+    assert parse_site(site.to_json(), "json") == site
+    assert parse_site(json.loads(json.dumps(site.to_geojson())), "geojson") == site
+    assert "no_go" not in parse_site({"boundary": SQUARE}, "s").to_json()
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"no_go": [[[1, 1], [2, 2]]]}, "no_go[0] has 2 points"),
+        ({"no_go": [[[1, 1], [3, 3], [3, 1], [1, 3]]]}, "no_go[0] crosses itself at (2.00, 2.00)"),
+        ({"no_go": [[[-1, -1], [5, -1], [5, 5], [-1, 5]]]}, "no_go leaves no floor"),
+        ({"no_go": [SQUARE], "start": [2, 2]}, "no_go leaves no floor"),
+        ({"no_go": [[[1, 1], [3, 1], [2, 3]]], "start": [2, 2]}, "start (2.00, 2.00) is not on"),
+    ],
+)
+def test_no_go_areas_that_cannot_be(more: Any, words: str) -> None:
+    with pytest.raises(SiteError) as caught:
+        parse_site({"boundary": SQUARE, **more}, "s")
+    assert words in str(caught.value)
+
+
+def test_a_no_go_area_outside_is_said_to_change_nothing() -> None:
+    site = parse_site({"boundary": SQUARE, "no_go": [[[5, 5], [6, 5], [6, 6]]]}, "s")
+    assert site.repairs == (
+        "no_go[0]: lies outside the floor at (5.00, 5.00); it changes nothing.",
+    )
+    assert site.floor().area == pytest.approx(16)
 
 
 def test_geojson_of_other_programs_is_read() -> None:
@@ -215,7 +251,7 @@ _json = st.recursive(
         st.lists(inner, max_size=4)
         | st.dictionaries(
             st.sampled_from(
-                ["boundary", "islands", "walls", "landmarks", "start", "id", "x", "name"]
+                ["boundary", "islands", "walls", "no_go", "landmarks", "start", "id", "x", "name"]
             ),
             inner,
             max_size=4,
@@ -234,6 +270,7 @@ _ring = st.lists(st.tuples(_coordinate, _coordinate).map(list), max_size=8)
         optional={
             "islands": st.lists(_ring, max_size=3) | _json,
             "walls": st.lists(_ring, max_size=2) | _json,
+            "no_go": st.lists(_ring, max_size=2) | _json,
             "start": _json,
         },
     )

@@ -18,6 +18,8 @@ _SIGHTINGS = 6
 """Contradicting sightings before a landmark is judged."""
 _WITNESSED = 3
 """The same where another landmark was in its place before and after them."""
+_SUSPICION = 10.0
+"""Seconds for which a landmark that contradicted has to be in its place to be believed."""
 _KNOWN = 0.03
 """Metres to which the best of these few must be known."""
 _SPAN = 2.0
@@ -121,6 +123,11 @@ class LandmarkHealth:
             return Verdict(number, "landmark_misread", dx, dy)
         self.moved[number] = (dx, dy)
         return Verdict(number, "landmark_moved", dx, dy)
+
+    def suspected(self, number: int, stamp: float) -> bool:
+        """Whether ``number`` contradicted lately and has not been in its place since."""
+        places = self._places.get(number)
+        return places is not None and len(places) >= 2 and stamp - places[-1][0] < _SUSPICION
 
     def stands_another(self, number: int, place: Point) -> bool:
         """Whether the map has another landmark than ``number`` at ``place``."""

@@ -381,7 +381,13 @@ class Localizer:
                 text = f"Landmark {number} stands again where the map has it."
                 self._events.add(LocalizerEvent(stamp, "landmark_back", text, number))
             return False
-        taken, gap = track.filter.take(measurement, mark, track.tolerance)
+        place = place_of(track.filter.pose, measurement, self._camera_forward)
+        off = 0.0 if place is None else math.dist(place, mark.position)
+        if off > 0.5 * settings.tolerance and health.suspected(number, stamp):
+            # A pose that has become vague since must not make room for it.
+            taken, gap = False, off
+        else:
+            taken, gap = track.filter.take(measurement, mark, track.tolerance)
         if taken:
             self._last_agreed[number] = stamp
             health.agreed(number)
@@ -391,7 +397,6 @@ class Localizer:
                     self._tell(verdict, stamp)
             self._seen(track, measurement)
             return True
-        place = place_of(track.filter.pose, measurement, self._camera_forward)
         offset = (None, None) if place is None else (place[0] - mark.x, place[1] - mark.y)
         text = f"Landmark {number} appears {100 * gap:.0f} cm from where it should be."
         self._events.report(LocalizerEvent(stamp, "rejected", text, number, *offset))

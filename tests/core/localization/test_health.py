@@ -82,3 +82,15 @@ def test_agreement_in_between_acquits() -> None:
         assert health.contradicted(1, index, (5.3, 0.2), 0.02) is None
         assert not health.agreed(1)
     assert health.witnessed(2) == []
+
+
+def test_who_contradicted_is_suspected_for_a_while() -> None:
+    health = LandmarkHealth(MARKS)
+    health.contradicted(1, 0.0, (5.3, 0.2), 0.10)
+    assert not health.suspected(1, 0.1)
+    health.contradicted(1, 0.1, (5.3, 0.2), 0.10)
+    assert health.suspected(1, 0.2)
+    assert not health.suspected(2, 0.2)
+    assert not health.suspected(1, 20.0)
+    health.agreed(1)
+    assert not health.suspected(1, 0.3)

@@ -26,6 +26,13 @@ const room: sites.Site = {
       [3, 1],
     ],
   ],
+  no_go: [
+    [
+      [0.2, 2.2],
+      [0.7, 2.2],
+      [0.7, 2.7],
+    ],
+  ],
   landmarks: [
     { id: 1, x: 0, y: 1 },
     { id: 2, x: 4, y: 1 },
@@ -88,6 +95,20 @@ describe("editing", () => {
     expect(moved.start).toEqual([2, 2, site.start?.[2]]);
   });
 
+  it("draws no-go areas, picks and removes them", () => {
+    const ring: Point[] = [
+      [0, 0],
+      [1, 0],
+      [1, 1],
+    ];
+    const { site, selection } = sites.added(room, "nogo", ring);
+    expect(selection).toEqual({ kind: "nogo", index: 1 });
+    expect(sites.vertices(site, selection)).toEqual(ring);
+    expect(sites.title(site, selection)).toBe("No-go area 2");
+    expect(sites.onFloor(site, [0.8, 0.4])).toBe(false);
+    expect(sites.removed(site, selection)).toEqual(room);
+  });
+
   it("names new routes apart", () => {
     const nodes: Point[] = [
       [0, 0],
@@ -103,6 +124,7 @@ it("says the server's refusals in the page's words", () => {
   expect(sites.inWords("the site: islands[0] crosses itself.", room)).toBe(
     "Island 1 crosses itself.",
   );
+  expect(sites.inWords("no_go[0] leaves no floor.", room)).toBe("No-go area 1 leaves no floor.");
   expect(sites.inWords("landmarks[1] stands outside.", room)).toBe("Landmark 2 stands outside.");
 });
 
@@ -176,6 +198,7 @@ it("a file that the page could not show is refused with what is wrong", () => {
     [{ boundary: [[0, null]] }, "boundary"],
     [{ boundary, islands: [[1, 2]] }, "islands"],
     [{ boundary, walls: {} }, "walls"],
+    [{ boundary, no_go: [[1, 2]] }, "no-go"],
     [{ boundary, landmarks: [{ id: 1 }] }, "landmarks"],
     [{ boundary, landmarks: [null] }, "landmarks"],
     [{ boundary, routes: [{ name: "A" }] }, "routes"],
@@ -183,5 +206,7 @@ it("a file that the page could not show is refused with what is wrong", () => {
     [{ boundary, name: 7 }, "name"],
   ];
   for (const [document, word] of wrong) expect(() => sites.asSite(document)).toThrow(word);
-  expect(sites.asSite({ boundary, start: null }).boundary).toEqual(boundary);
+  const bare = sites.asSite({ boundary, start: null });
+  expect(bare.boundary).toEqual(boundary);
+  expect(bare.no_go).toEqual([]);
 });

@@ -81,7 +81,15 @@ it("landmark and start end by themselves; Enter leaves the heading open", () => 
 it("other keys mean nothing to a drawing, and it always says what comes next", () => {
   expect(press(drawn("wall", [0, 0]), "q", NEAR)).toBeNull();
   expect(press(beginSketch("wall"), "5", NEAR)).toBeNull();
-  for (const kind of ["boundary", "island", "wall", "landmark", "route", "start"] as const) {
+  for (const kind of [
+    "boundary",
+    "island",
+    "wall",
+    "nogo",
+    "landmark",
+    "route",
+    "start",
+  ] as const) {
     expect(hint(beginSketch(kind))).toMatch(/^Click/);
   }
 });

@@ -1228,6 +1228,14 @@ export interface components {
              */
             name: string;
             /**
+             * No Go
+             * @default []
+             */
+            no_go: [
+                number,
+                number
+            ][][];
+            /**
              * Routes
              * @default []
              */

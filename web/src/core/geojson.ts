@@ -34,6 +34,7 @@ export function toGeoJson(site: Site): FeatureCollection {
       ...(site.boundary.length > 0 ? [feature("boundary", "Polygon", [close(site.boundary)])] : []),
       ...site.islands.map((ring) => feature("island", "Polygon", [close(ring)])),
       ...site.walls.map((wall) => feature("wall", "LineString", wall)),
+      ...site.no_go.map((ring) => feature("no_go", "Polygon", [close(ring)])),
       ...site.landmarks.map(({ x, y, ...kind }) => feature("landmark", "Point", [x, y], kind)),
       ...site.routes.map((route) =>
         feature("route", "LineString", route.nodes, { name: route.name }),
@@ -65,6 +66,9 @@ export function fromGeoJson(document: FeatureCollection): Site {
         if (role === "boundary") site.islands.push(...holes);
         break;
       }
+      case "no_go":
+        site.no_go.push(rings(coordinates, where)[0]);
+        break;
       case "wall":
         site.walls.push(points(coordinates, where));
         break;
@@ -88,7 +92,7 @@ export function fromGeoJson(document: FeatureCollection): Site {
       }
       default:
         throw new Error(
-          `${where} has the role ${JSON.stringify(role)}: expected boundary, island, wall, landmark, route or start.`,
+          `${where} has the role ${JSON.stringify(role)}: expected boundary, island, wall, no_go, landmark, route or start.`,
         );
     }
   });

@@ -24,12 +24,14 @@ export interface Site {
   boundary: Point[];
   islands: Point[][];
   walls: Point[][];
+  /** Floor that is not to be driven on. It hides nothing from the camera. */
+  no_go: Point[][];
   landmarks: Landmark[];
   routes: Route[];
   start?: Start;
 }
 
-export const KINDS = ["boundary", "island", "wall", "landmark", "route", "start"] as const;
+export const KINDS = ["boundary", "island", "wall", "nogo", "landmark", "route", "start"] as const;
 export type Kind = (typeof KINDS)[number];
 
 /** One thing of a site. `index` counts within its kind; a vertex where one is picked. */
@@ -44,6 +46,7 @@ export const emptySite = (name: string): Site => ({
   boundary: [],
   islands: [],
   walls: [],
+  no_go: [],
   landmarks: [],
   routes: [],
 });
@@ -72,6 +75,7 @@ function whatIsWrong(site: { [key in keyof Site]: unknown }): string | null {
   if (!isLine(site.boundary)) return "its boundary is no list of points [x, y]";
   if (!list(site.islands, isLine)) return "its islands are no lists of points [x, y]";
   if (!list(site.walls, isLine)) return "its walls are no lists of points [x, y]";
+  if (!list(site.no_go, isLine)) return "its no-go areas are no lists of points [x, y]";
   if (!list(site.landmarks, (m) => has(m, ({ id, x, y }) => [id, x, y].every(isNumber))))
     return "its landmarks are not all objects with id, x and y";
   if (
@@ -95,7 +99,8 @@ function clean(site: Site): Site {
   return { ...rest, landmarks, ...(start ? { start } : {}) };
 }
 
-export const isRing = (kind: Kind): boolean => kind === "boundary" || kind === "island";
+export const isRing = (kind: Kind): boolean =>
+  kind === "boundary" || kind === "island" || kind === "nogo";
 
 /** The corners of a thing (one for a landmark or the start). */
 export function vertices(site: Site, at: Selection): Point[] {
@@ -106,6 +111,8 @@ export function vertices(site: Site, at: Selection): Point[] {
       return site.islands[at.index] ?? [];
     case "wall":
       return site.walls[at.index] ?? [];
+    case "nogo":
+      return site.no_go[at.index] ?? [];
     case "route":
       return site.routes[at.index]?.nodes ?? [];
     case "landmark": {
@@ -131,6 +138,8 @@ export function withVertices(site: Site, at: Selection, points: Point[]): Site {
       return { ...site, islands: replaced(site.islands, at.index, points) };
     case "wall":
       return { ...site, walls: replaced(site.walls, at.index, points) };
+    case "nogo":
+      return { ...site, no_go: replaced(site.no_go, at.index, points) };
     case "route": {
       const route = { ...site.routes[at.index], nodes: points };
       return { ...site, routes: replaced(site.routes, at.index, route) };
@@ -164,6 +173,11 @@ export function added(
       return {
         site: { ...site, walls: [...site.walls, points] },
         selection: { kind, index: site.walls.length },
+      };
+    case "nogo":
+      return {
+        site: { ...site, no_go: [...site.no_go, points] },
+        selection: { kind, index: site.no_go.length },
       };
     case "route":
       return {
@@ -215,6 +229,8 @@ export function removed(site: Site, at: Selection): Site {
       return { ...site, islands: without(site.islands) };
     case "wall":
       return { ...site, walls: without(site.walls) };
+    case "nogo":
+      return { ...site, no_go: without(site.no_go) };
     case "route":
       return { ...site, routes: without(site.routes) };
     case "landmark":
@@ -234,6 +250,7 @@ export function shapes(site: Site): Selection[] {
     ...all("route", site.routes),
     ...all("wall", site.walls),
     ...all("island", site.islands),
+    ...all("nogo", site.no_go),
     ...(site.boundary.length > 0 ? [{ kind: "boundary" as const, index: 0 }] : []),
   ];
 }
@@ -246,6 +263,8 @@ export function title(site: Site, at: Selection): string {
       return `Island ${at.index + 1}`;
     case "wall":
       return `Wall ${at.index + 1}`;
+    case "nogo":
+      return `No-go area ${at.index + 1}`;
     case "route":
       return `Route “${site.routes[at.index]?.name ?? ""}”`;
     case "landmark":
@@ -260,13 +279,15 @@ export function inWords(message: string, site: Site): string {
   const kinds: Record<string, Kind> = {
     islands: "island",
     walls: "wall",
+    no_go: "nogo",
     landmarks: "landmark",
     routes: "route",
   };
   const named = message
     .replace(/^(the )?site: /i, "")
-    .replace(/\b(islands|walls|landmarks|routes)\[(\d+)\]/g, (_, list: string, index: string) =>
-      title(site, { kind: kinds[list], index: Number(index) }),
+    .replace(
+      /\b(islands|walls|no_go|landmarks|routes)\[(\d+)\]/g,
+      (_, list: string, index: string) => title(site, { kind: kinds[list], index: Number(index) }),
     );
   return named.charAt(0).toUpperCase() + named.slice(1);
 }
@@ -275,9 +296,10 @@ export function siteBounds(site: Site): Bounds | null {
   return bounds(shapes(site).flatMap((at) => vertices(site, at)));
 }
 
-/** Whether a place lies on the floor: inside the boundary and in no island. */
+/** Whether a place lies on the floor: inside the boundary, in no island and in no no-go area. */
 export function onFloor(site: Site, p: Point): boolean {
-  return insideRing(p, site.boundary) && !site.islands.some((ring) => insideRing(p, ring));
+  const closed = [...site.islands, ...site.no_go];
+  return insideRing(p, site.boundary) && !closed.some((ring) => insideRing(p, ring));
 }
 
 /** The segment string of an id, top first, as in the core: 1 orange, 0 black. */

@@ -52,7 +52,7 @@ function handleAt(site: Site, at: Selection, p: Point, reach: number): Selection
   return between >= 0 ? "insert" : null;
 }
 
-/** The thing under the pointer: poles first, then lines, then what lies inside an island. */
+/** The thing under the pointer: poles first, then lines, then what lies inside an area. */
 export function thingAt(site: Site, p: Point, reach: number): Selection | null {
   const things = shapes(site);
   const near = things.find((at) => {
@@ -72,7 +72,11 @@ export function thingAt(site: Site, p: Point, reach: number): Selection | null {
     );
   });
   return (
-    near ?? things.find((at) => at.kind === "island" && insideRing(p, vertices(site, at))) ?? null
+    near ??
+    things.find(
+      (at) => (at.kind === "island" || at.kind === "nogo") && insideRing(p, vertices(site, at)),
+    ) ??
+    null
   );
 }
 

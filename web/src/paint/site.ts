@@ -1,8 +1,8 @@
-/** Paints the drawn map: grid, floor, islands, walls, routes, start, landmarks. */
+/** Paints the drawn map: grid, floor, no-go areas, islands, walls, routes, start, landmarks. */
 
-import { marksAlong, type Point } from "../core/geometry";
+import { marksAlong, type Point, ringArea, ringLabel } from "../core/geometry";
 import { landmarkCode, type Selection, type Site } from "../core/site";
-import { disc, line, type Paper, trace, words } from "./paper";
+import { disc, hatching, line, type Paper, paragraph, trace, words } from "./paper";
 
 export interface SiteLook {
   selection?: Selection | null;
@@ -49,6 +49,7 @@ export function paintSite(paper: Paper, site: Site, look: SiteLook = {}): void {
   const { ctx, palette } = paper;
   const { selection } = look;
   const colour = (chosen: boolean) => (chosen ? palette.accent : palette.ink);
+  site.no_go.forEach((ring, i) => paintNoGo(paper, ring, is(selection, "nogo", i)));
   site.islands.forEach((ring, i) => {
     ctx.beginPath();
     trace(paper, ring, true);
@@ -82,6 +83,20 @@ export function paintSite(paper: Paper, site: Site, look: SiteLook = {}): void {
       suspected: look.suspected?.has(mark.id) ?? false,
     });
   });
+}
+
+/** Floor that is not to be driven on: hatched, with its name where there is room for it. */
+function paintNoGo(paper: Paper, ring: readonly Point[], chosen: boolean): void {
+  const { ctx, palette, resolution } = paper;
+  ctx.beginPath();
+  trace(paper, ring, true);
+  ctx.fillStyle = hatching(paper, palette.noGo);
+  ctx.fill();
+  const color = chosen ? palette.accent : palette.noGo;
+  line(paper, [...ring, ring[0]], { color, width: chosen ? 3 : 2, dash: [8, 4] });
+  if (ringArea(ring) / resolution ** 2 > 4_000) {
+    paragraph(paper, "No-go", paper.at(ringLabel(ring)), palette.noGo);
+  }
 }
 
 function paintRoute(paper: Paper, nodes: readonly Point[], name: string, chosen: boolean): void {

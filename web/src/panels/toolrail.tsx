@@ -12,6 +12,7 @@ const TOOLS: { kind: Kind; label: string; key: string }[] = [
   { kind: "boundary", label: "Draw boundary", key: "B" },
   { kind: "island", label: "Draw island", key: "I" },
   { kind: "wall", label: "Draw wall", key: "W" },
+  { kind: "nogo", label: "Draw no-go area", key: "N" },
   { kind: "landmark", label: "Place landmark", key: "L" },
   { kind: "route", label: "Draw route", key: "R" },
   { kind: "start", label: "Set start", key: "S" },

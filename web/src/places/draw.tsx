@@ -256,6 +256,7 @@ function Overview({ drawn }: { drawn: Site }) {
           </Fact>
           <Fact name="Drawn">
             {count(drawn.islands.length, "island")}, {count(drawn.walls.length, "wall")}
+            {drawn.no_go.length > 0 && `, ${count(drawn.no_go.length, "no-go area")}`}
           </Fact>
           <Fact name="Landmarks">{drawn.landmarks.length}</Fact>
         </Facts>

@@ -104,7 +104,7 @@ function lay(record: Saved): void {
   if (kept && JSON.stringify(kept.site) !== JSON.stringify(record.site)) {
     // The kept draft was made of an older version: saving it has to meet the conflict.
     saved.value = { ...record, version: kept.version };
-    put(history.record(steps.value, kept.site));
+    put(history.record(steps.value, { ...emptySite(kept.site.name), ...kept.site }));
     say("Your unsaved changes are back. Save keeps them, Undo drops them.");
   }
   opened.value += 1;

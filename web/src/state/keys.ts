@@ -11,6 +11,7 @@ export const TOOL_KEYS: Record<string, Kind> = {
   b: "boundary",
   i: "island",
   w: "wall",
+  n: "nogo",
   l: "landmark",
   r: "route",
   s: "start",

@@ -57,6 +57,7 @@ const sameView = (a: Site, b: Site): boolean =>
   a.boundary === b.boundary &&
   a.islands === b.islands &&
   a.walls === b.walls &&
+  a.no_go === b.no_go &&
   a.landmarks === b.landmarks;
 
 let next: Site | null = null;

@@ -5,6 +5,7 @@ const PATHS = {
   boundary: "M4 6l7-3 9 4-1 12-13 2z",
   island: "M4 6h16v12H4z M10 6l-6 6 M16 6L4 18 M20 8L10 18 M20 14l-4 4",
   wall: "M4 20L20 4",
+  nogo: "M12 12m-9 0a9 9 0 1018 0 9 9 0 10-18 0 M5.7 5.7l12.6 12.6",
   landmark: "M9 2h6v20H9z M9 6h6 M9 10h6 M9 14h6 M9 18h6",
   route: "M5 19h8a3 3 0 000-6H9a3 3 0 010-6h10 M16 4l3 3-3 3",
   start: "M12 12m-9 0a9 9 0 1018 0 9 9 0 10-18 0 M9 8l7 4-7 4z",

@@ -87,6 +87,13 @@ class Site:
         pairs = [pair for ring in rings for pair in zip(ring, (*ring[1:], ring[0]), strict=True)]
         return pairs + [pair for wall in self.walls for pair in pairwise(wall)]
 
+    def barriers(self) -> list[tuple[Point, Point]]:
+        """All lines that are not to be driven across: `segments` and the rims of no-go areas."""
+        rims = [
+            pair for ring in self.no_go for pair in zip(ring, (*ring[1:], ring[0]), strict=True)
+        ]
+        return self.segments() + rims
+
     def route(self, name: str) -> Route:
         """The route of that name.
 

@@ -72,11 +72,9 @@ class ObstacleAvoidance:
     def __init__(self, proximity: Proximity, vehicle: Vehicle, site: Site) -> None:
         self._proximity = proximity
         self._vehicle = vehicle
-        self._scenery = Scenery(
-            site.segments(),
-            [(mark.position, mark.kind.diameter / 2) for mark in site.landmarks],
-        )
-        self._memory = ObstacleMemory(proximity, self._scenery)
+        poles = [(mark.position, mark.kind.diameter / 2) for mark in site.landmarks]
+        self._barriers = Scenery(site.barriers(), poles)
+        self._memory = ObstacleMemory(proximity, Scenery(site.segments(), poles))
         self._detour: PathTracker | None = None
         self._way: Floats = np.empty((0, 2))
         self._rejoin_at = 0.0
@@ -264,7 +262,7 @@ class ObstacleAvoidance:
         if command.speed == 0 or not (bodies or astray):
             return True
         discs = Scenery([], bodies)
-        walls = self._scenery.near(pose.position, 1.0) if astray else Scenery()
+        walls = self._barriers.near(pose.position, 1.0) if astray else Scenery()
         speed = abs(command.speed)
         reach = 0.06 + speed * 0.2 + speed**2 / (2 * self._vehicle.max_acceleration)
         curvature = math.tan(command.steering) / self._vehicle.wheelbase
@@ -346,7 +344,7 @@ class ObstacleAvoidance:
             wanted=vehicle.body_radius + KEEP,
         )
         goals = [(float(points[index, 0]), float(points[index, 1])) for index in places]
-        found = find(pose.position, goals, self.obstacles, barrier, self._scenery, room)
+        found = find(pose.position, goals, self.obstacles, barrier, self._barriers, room)
         if found is None:
             return False
         index = int(places[found[0]])
@@ -404,7 +402,7 @@ class ObstacleAvoidance:
         """Straight back, as far as the map says that there is room; nothing looks that way."""
         behind = pose.ahead(-(self._vehicle.body_radius + 0.10))
         discs = Scenery([], self.obstacles)
-        room = min(self._scenery.distance(behind), discs.distance(behind))
+        room = min(self._barriers.distance(behind), discs.distance(behind))
         self._backing -= 0.12 * dt
         if self._backing <= 0 or room < self._vehicle.body_radius + WALL_ROOM:
             self._backing = 0.0

@@ -98,6 +98,16 @@ def test_after_long_waiting_the_right_will_do() -> None:
     assert math.dist(met.end.position, LINE[-1]) < 0.03
 
 
+def test_no_detour_leads_through_a_no_go_area() -> None:
+    carpet = ((2.5, 3.5), (5.5, 3.5), (5.5, 5.5), (2.5, 5.5))
+    site = Site(boundary=ROOM.boundary, no_go=(carpet,))
+    met = meet(LINE, site, [Obstacle(*PERSON)])
+    assert met.done
+    assert met.to_people >= 0.15
+    # On the left there would be room, but for the carpet.
+    assert all(not (2.4 < x < 5.6 and y > 3.4) for x, y in met.positions)
+
+
 def test_passage_goes_on_when_the_person_has_left() -> None:
     person = Obstacle(4.0, 3.0, waypoints=((4.0, 9.0),), starts=20.0)
     met = meet(LINE, corridor(1.2), [person])

@@ -39,6 +39,9 @@ def plan(
     clearance: Annotated[float, typer.Option(help="Path to walls, at least, m.")] = 0.2,
     min_turn_radius: Annotated[float, typer.Option(help="Tightest turn, m; 0 for none.")] = 0.6,
     start: Annotated[str | None, typer.Option(help="X,Y or X,Y,HEADING; m and rad.")] = None,
+    end_heading: Annotated[
+        float | None, typer.Option(help="Heading at the last node of the route, rad.")
+    ] = None,
     order: Annotated[LoopOrder, typer.Option(help="Order of the loops.")] = LoopOrder.DEFAULT,
     plot: Annotated[Path | None, typer.Option(help="Write a drawing here, SVG.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
@@ -61,7 +64,7 @@ def plan(
             order=order.value,
         )
     with naming_file(site_file):
-        result = make_plan(site, mode, route, options)
+        result = make_plan(site, mode, route, options, end_heading)
     if plot is not None:
         try:
             plot.write_text(plot_svg(site, result), encoding="utf-8")
@@ -73,7 +76,13 @@ def plan(
         typer.echo(_summary(result))
 
 
-def make_plan(site: Site, mode: JobMode, route: str | None, options: PlanOptions) -> Plan:
+def make_plan(
+    site: Site,
+    mode: JobMode,
+    route: str | None,
+    options: PlanOptions,
+    end_heading: float | None = None,
+) -> Plan:
     """The plan of a job.
 
     Raises:
@@ -88,9 +97,11 @@ def make_plan(site: Site, mode: JobMode, route: str | None, options: PlanOptions
         if route is None:
             known = ", ".join(repr(entry.name) for entry in site.routes) or "none"
             raise InputError(f"--route is missing: the site's routes are {known}.")
-        return plan_route(site, route, options)
+        return plan_route(site, route, options, end_heading)
     if route is not None:
         raise InputError("--route is given with --mode scan: expected --mode route.")
+    if end_heading is not None:
+        raise InputError("--end-heading is given with --mode scan: expected --mode route.")
     return plan_scan(site, options)
 
 

@@ -1,10 +1,10 @@
 """Sites as GeoJSON: a FeatureCollection in local metres, a ``role`` property per feature.
 
 Roles: ``boundary`` (Polygon; its holes are islands), ``island`` (Polygon), ``wall`` (LineString),
-``no_go`` (Polygon),
-``landmark`` (Point, properties id and what differs from the usual kind), ``route`` (LineString or
-Point, property name), ``start`` (Point, property heading). Other properties and members are left
-alone, as RFC 7946 asks; a third coordinate (height) is not used.
+``no_go`` (Polygon), ``landmark`` (Point, properties id and what differs from the usual kind),
+``route`` (LineString or Point, properties name and heading), ``start`` (Point, property heading).
+Other properties and members are left alone, as RFC 7946 asks; a third coordinate (height) is not
+used.
 """
 
 from __future__ import annotations
@@ -86,7 +86,10 @@ def _add(site: dict[str, Any], feature: Any, field: str, reader: Reader) -> None
         site["landmarks"].append({**entry, "x": coordinates[0], "y": coordinates[1]})
     elif role == "route":
         nodes = [coordinates] if geometry["type"] == "Point" else coordinates
-        site["routes"].append({"name": properties.get("name"), "nodes": nodes})
+        entry = {"name": properties.get("name"), "nodes": nodes}
+        if properties.get("heading") is not None:
+            entry["heading"] = properties["heading"]
+        site["routes"].append(entry)
     else:
         if "start" in site:
             raise reader.refuse(field, "is a second start: expected one.")
@@ -119,7 +122,8 @@ def to_geojson(site: dict[str, Any]) -> dict[str, Any]:
         nodes = route["nodes"]
         single = len(nodes) == 1
         shape = ("Point", nodes[0]) if single else ("LineString", nodes)
-        features.append(_feature("route", *shape, name=route["name"]))
+        named = {key: value for key, value in route.items() if key != "nodes"}
+        features.append(_feature("route", *shape, **named))
     if (start := site.get("start")) is not None:
         heading = {"heading": start[2]} if len(start) == 3 else {}
         features.append(_feature("start", "Point", start[:2], **heading))

@@ -13,7 +13,7 @@ from shapely import LineString, MultiPolygon, Polygon
 
 from polepilot.core import geojson
 from polepilot.core.errors import InputError, SiteError
-from polepilot.core.geometry import Point, Polyline, wrap_angle
+from polepilot.core.geometry import Point, Polyline
 from polepilot.core.landmark import Landmark, LandmarkKind
 from polepilot.core.site_file import Reader, place
 
@@ -29,6 +29,13 @@ class Route:
 
     name: str
     nodes: Polyline
+    heading: float | None = None
+    """How the robot is to stand at the last node, radians in `map`; None: as it comes."""
+
+    def to_json(self) -> dict[str, Any]:
+        """As in SITE.json."""
+        document: dict[str, Any] = {"name": self.name, "nodes": [list(p) for p in self.nodes]}
+        return document if self.heading is None else {**document, "heading": self.heading}
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +136,7 @@ class Site:
             "islands": [[list(p) for p in ring] for ring in self.islands],
             "walls": [[list(p) for p in wall] for wall in self.walls],
             "landmarks": landmarks,
-            "routes": [{"name": r.name, "nodes": [list(p) for p in r.nodes]} for r in self.routes],
+            "routes": [route.to_json() for route in self.routes],
         }
         if self.no_go:
             document["no_go"] = [[list(p) for p in ring] for ring in self.no_go]
@@ -245,11 +252,14 @@ def _landmark(value: Any, name: str, reader: Reader) -> Landmark:
 
 
 def _route(value: Any, name: str, reader: Reader) -> Route:
-    entry = reader.object(value, name, ("name", "nodes"))
+    entry = reader.object(value, name, ("name", "nodes", "heading"))
     label = reader.text(entry.get("name"), f"{name}.name")
     if not label.strip():
         raise reader.refuse(f"{name}.name", "is empty: expected a name.")
-    return Route(label, reader.line(entry.get("nodes"), f"{name}.nodes", 1))
+    nodes = reader.line(entry.get("nodes"), f"{name}.nodes", 1)
+    if (heading := entry.get("heading")) is None:
+        return Route(label, nodes)
+    return Route(label, nodes, reader.angle(heading, f"{name}.heading"))
 
 
 def _start(value: Any, reader: Reader) -> Start:
@@ -261,7 +271,7 @@ def _start(value: Any, reader: Reader) -> Start:
     x, y = reader.point(numbers[:2], "start")
     if len(numbers) == 2:
         return Start(x, y)
-    return Start(x, y, wrap_angle(reader.number(numbers[2], "start[2]", largest=1000.0)))
+    return Start(x, y, reader.angle(numbers[2], "start[2]"))
 
 
 def _check_unique(values: list[Any], field_name: str, key: str, reader: Reader) -> None:

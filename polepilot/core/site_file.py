@@ -15,7 +15,7 @@ import shapely
 from shapely import Polygon
 
 from polepilot.core.errors import SiteError
-from polepilot.core.geometry import Point, Polyline
+from polepilot.core.geometry import Point, Polyline, wrap_angle
 
 LARGEST = 100_000.0
 """No coordinate of a site is farther from the origin than this, metres."""
@@ -81,6 +81,10 @@ class Reader:
                 field, f"is {shown}: expected a finite number from {-largest:g} to {largest:g}."
             )
         return float(value)
+
+    def angle(self, value: Any, field: str) -> float:
+        """Radians, as a direction in (-pi, pi]."""
+        return wrap_angle(self.number(value, field, largest=1000.0))
 
     def integer(self, value: Any, field: str) -> int:
         number = self.number(value, field)

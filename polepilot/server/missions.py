@@ -177,6 +177,7 @@ class Missions:
                 "site": row.document,
                 "mode": wanted.mode,
                 "route": wanted.route,
+                "end_heading": wanted.end_heading,
                 "options": options,
                 "area": area,
             }

@@ -23,9 +23,9 @@ class Planner(Worker):
         """Compute a plan.
 
         Args:
-            job: ``site`` (SITE.json), ``mode``, ``route``, ``options`` (what PlanOptions is given
-                besides the vehicle; ``start`` as a list), ``area`` (MultiPolygon coordinates, or
-                None for everything that can be reached).
+            job: ``site`` (SITE.json), ``mode``, ``route``, ``end_heading`` (rad, or None),
+                ``options`` (what PlanOptions is given besides the vehicle; ``start`` as a list),
+                ``area`` (MultiPolygon coordinates, or None for everything that can be reached).
 
         Returns:
             what ``convert.plan_document`` makes of the plan.
@@ -53,7 +53,7 @@ def compute(job: dict[str, Any]) -> dict[str, Any]:
         options["start"] = Start(*start)
     wanted = PlanOptions.from_vehicle(Vehicle(**job["vehicle"]), **options)
     if job["mode"] == "route":
-        return plan_document(plan_route(site, job["route"], wanted))
+        return plan_document(plan_route(site, job["route"], wanted, job.get("end_heading")))
     area = None if job["area"] is None else multipolygon_of(job["area"])
     return plan_document(plan_scan(site, wanted, area))
 

@@ -119,6 +119,8 @@ class LandmarkDocument(Model):
 class RouteDocument(Model):
     name: str
     nodes: list[Place]
+    heading: float | None = None
+    """How the robot is to stand at the last node; null: as it comes."""
 
 
 class SiteDocument(Model):
@@ -183,6 +185,8 @@ class PlanRequest(Request):
     clearance: Annotated[FiniteFloat, Field(ge=0, le=100)] | None = None
     min_turn_radius: Annotated[FiniteFloat, Field(ge=0, le=1000)] | None = None
     start: StartPlace | None = None
+    end_heading: Annotated[FiniteFloat, Field(ge=-1000, le=1000)] | None = None
+    """How to stand at the last node, for mode `route`; not given: as the route says."""
     order: Literal["default", "paper"] | None = None
     pending_of: StrictId | None = None
     """Plan only what this run left uncovered, from where the robot stands now."""

@@ -39,6 +39,14 @@ def test_only_a_boundary_is_needed() -> None:
     assert site == Site(boundary=((0, 0), (4, 0), (4, 4), (0, 4)))
 
 
+def test_a_route_may_say_how_to_stand_at_its_end() -> None:
+    route = {"name": "a", "nodes": [[1, 1], [2, 2]], "heading": 4.0}
+    site = parse_site({"boundary": SQUARE, "routes": [route]}, "s")
+    assert site.routes[0].heading == pytest.approx(4.0 - math.tau)
+    assert parse_site(site.to_json(), "json") == site
+    assert parse_site(json.loads(json.dumps(site.to_geojson())), "geojson") == site
+
+
 def test_rings_are_turned_counter_clockwise() -> None:
     site = parse_site({"boundary": SQUARE[::-1], "islands": [[[1, 1], [1, 2], [2, 1]]]}, "s")
     assert Polygon(site.boundary).exterior.is_ccw
@@ -76,6 +84,10 @@ def test_rings_are_turned_counter_clockwise() -> None:
         ({"boundary": SQUARE, "routes": [{"name": "", "nodes": [[1, 1]]}]}, "name is empty"),
         ({"boundary": SQUARE, "routes": [{"name": "a", "nodes": []}]}, "routes[0].nodes has 0"),
         ({"boundary": SQUARE, "routes": [{"name": "a", "nodes": [[1, 1]]}] * 2}, "is 'a', as in"),
+        (
+            {"boundary": SQUARE, "routes": [{"name": "a", "nodes": [[1, 1]], "heading": "up"}]},
+            "routes[0].heading is the text 'up'",
+        ),
         ({"boundary": SQUARE, "start": [1]}, "start has 1 numbers"),
         ({"boundary": SQUARE, "start": [1, 1, NAN]}, "start[2] is nan"),
         ({"type": "FeatureCollection", "features": []}, "no feature has the role 'boundary'"),

@@ -44,6 +44,7 @@ const room: sites.Site = {
         [0.5, 0.5],
         [3.5, 2.5],
       ],
+      heading: 1.5,
     },
   ],
   start: [0.5, 0.5, 0],
@@ -206,6 +207,8 @@ it("a file that the page could not show is refused with what is wrong", () => {
     [{ boundary, name: 7 }, "name"],
   ];
   for (const [document, word] of wrong) expect(() => sites.asSite(document)).toThrow(word);
+  const routes = [{ name: "A", nodes: [[1, 1]], heading: null }];
+  expect(sites.asSite({ boundary, routes }).routes).toEqual([{ name: "A", nodes: [[1, 1]] }]);
   const bare = sites.asSite({ boundary, start: null });
   expect(bare.boundary).toEqual(boundary);
   expect(bare.no_go).toEqual([]);

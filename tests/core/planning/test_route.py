@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 from core.planning import judge, maps
-from shapely import LineString, Point
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import LineString, Point, Polygon
 
 from polepilot.core.errors import PlanError, SiteError
+from polepilot.core.geometry import angle_between
 from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.route import plan_route
 from polepilot.core.site import Start, read_site
@@ -57,12 +61,104 @@ def test_around_an_obstacle(radius: float) -> None:
 
 def test_nodes_that_cannot_be_reached() -> None:
     site = maps.office()
-    with pytest.raises(PlanError, match=r"node 2 of route '' at \(6\.00, 1\.50\)"):
+    with pytest.raises(PlanError, match=r"node 2 at \(6\.00, 1\.50\)"):
         plan_route(site, [(2.0, 3.7), (6.0, 1.5)], PlanOptions())
     with pytest.raises(PlanError, match="at least one node"):
         plan_route(site, [], PlanOptions())
     with pytest.raises(SiteError, match="'Nowhere' is not on the site"):
         plan_route(site, "Nowhere", PlanOptions())
+
+
+def test_a_node_where_nobody_can_stand_is_refused_with_the_reason() -> None:
+    carpet, table = maps.box(4, 1, 6, 3), maps.box(1, 1, 2, 2)
+    site = maps.site(maps.box(0, 0, 8, 4), [table], no_go=[carpet], start=[0.5, 0.5])
+    for node, words in (
+        ((5.0, 2.0), "lies in no-go area 1"),
+        ((1.5, 1.5), "lies in island 1"),
+        ((9.0, 1.0), "lies outside the boundary"),
+        ((3.9, 2.0), r"is 10 cm away"),
+    ):
+        with pytest.raises(PlanError, match=words):
+            plan_route(site, [node], PlanOptions())
+
+
+def test_what_is_driven_around_is_named() -> None:
+    site = maps.site(
+        maps.box(0, 0, 12, 6),
+        [maps.box(2, 2, 3, 4)],
+        walls=[[[5, 1], [5, 6]]],
+        no_go=[maps.box(8, 0, 9, 4)],
+        start=[1, 3, 0],
+    )
+    nodes = [(4.0, 3.0), (6.0, 3.0), (11.0, 3.0), (11.0, 5.0)]
+    plan = plan_route(site, nodes, PlanOptions(min_turn_radius=0))
+    around = [note for note in plan.notes if "not free" in note]
+    assert [note.split("(")[1].split(")")[0] for note in around] == [
+        "island 1",
+        "wall 1",
+        "no-go area 1",
+    ]
+    assert judge.clearance_of(plan, site) >= 0.199
+    assert LineString(plan.path).distance(Polygon(site.no_go[0])) >= 0.199
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.36, 0.6])
+@pytest.mark.parametrize("heading", [0.0, 1.5, 3.0, -2.0])
+def test_the_heading_at_the_end_is_as_asked_for(radius: float, heading: float) -> None:
+    site = maps.site(maps.box(0, 0, 6, 5), start=[1, 1, 0])
+    plan = plan_route(
+        site, [(3.0, 1.5), (4.0, 3.0)], PlanOptions(min_turn_radius=radius), end_heading=heading
+    )
+    last = (plan.path[-1] - plan.path[-2]) * plan.gear[-1]
+    assert abs(angle_between(math.atan2(last[1], last[0]), heading)) < 0.06  # a chord of an arc
+    assert plan.path[-1] == pytest.approx((4.0, 3.0), abs=1e-6)
+    assert LineString(plan.path).distance(Point(3.0, 1.5)) < 0.01
+    assert judge.clearance_of(plan, site) >= 0.199
+    if radius:
+        assert judge.sharpest(plan) >= 0.98 * radius
+
+
+def test_the_heading_of_a_drawn_route_counts_unless_another_is_asked_for() -> None:
+    route = {"name": "Dock", "nodes": [[4.0, 3.0]], "heading": 2.0}
+    site = maps.site(maps.box(0, 0, 6, 5), start=[1, 1, 0], routes=[route])
+    for asked, expected in ((None, 2.0), (-1.0, -1.0)):
+        plan = plan_route(site, "Dock", PlanOptions(min_turn_radius=0), asked)
+        last = plan.path[-1] - plan.path[-2]
+        assert math.atan2(last[1], last[0]) == pytest.approx(expected, abs=1e-6)
+    with pytest.raises(PlanError, match="not finite"):
+        plan_route(site, "Dock", PlanOptions(), math.nan)
+
+
+def test_a_heading_for_which_there_is_no_room() -> None:
+    site = maps.site(maps.box(0, 0, 6, 0.41), start=[1, 0.205, 0])
+    for radius in (0.0, 0.6):
+        with pytest.raises(PlanError, match=r"node 1 at \(4\.00, 0\.20\).*90°"):
+            plan_route(site, [(4.0, 0.205)], PlanOptions(min_turn_radius=radius), math.pi / 2)
+
+
+def test_changes_of_gear_are_said() -> None:
+    site = maps.site(maps.box(0, 0, 6, 4))
+    plan = plan_route(site, [(1.0, 2.0)], PlanOptions(start=Start(4.0, 2.0, 0.0)))
+    said = [note for note in plan.notes if "changes its gear" in note]
+    assert bool(said) == (plan.predicted.reversals > 0)
+
+
+@settings(deadline=None, max_examples=10)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.6]))
+def test_random_routes_touch_nothing_or_are_refused(seed: int, radius: float) -> None:
+    rng = np.random.default_rng(seed)
+    try:
+        site = maps.random_site(rng)
+        nodes = [tuple(node) for node in rng.uniform(-2.5, 2.5, (3, 2))]
+        plan = plan_route(
+            site, nodes, PlanOptions(min_turn_radius=radius), float(rng.uniform(-3, 3))
+        )
+    except (SiteError, PlanError):
+        return
+    assert judge.clearance_of(plan, site) >= 0.199
+    assert max(LineString(plan.path).distance(Point(node)) for node in nodes) < 0.01
+    if radius:
+        assert judge.sharpest(plan) >= 0.98 * radius
 
 
 def test_turning_round_in_place() -> None:

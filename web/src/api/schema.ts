@@ -891,6 +891,8 @@ export interface components {
         PlanRequest: {
             /** Clearance */
             clearance?: number | null;
+            /** End Heading */
+            end_heading?: number | null;
             /** Min Turn Radius */
             min_turn_radius?: number | null;
             /**
@@ -1099,6 +1101,8 @@ export interface components {
         };
         /** RouteDocument */
         RouteDocument: {
+            /** Heading */
+            heading?: number | null;
             /** Name */
             name: string;
             /** Nodes */

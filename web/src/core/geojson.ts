@@ -36,9 +36,7 @@ export function toGeoJson(site: Site): FeatureCollection {
       ...site.walls.map((wall) => feature("wall", "LineString", wall)),
       ...site.no_go.map((ring) => feature("no_go", "Polygon", [close(ring)])),
       ...site.landmarks.map(({ x, y, ...kind }) => feature("landmark", "Point", [x, y], kind)),
-      ...site.routes.map((route) =>
-        feature("route", "LineString", route.nodes, { name: route.name }),
-      ),
+      ...site.routes.map(({ nodes, ...named }) => feature("route", "LineString", nodes, named)),
       ...(site.start
         ? [
             feature("start", "Point", [site.start[0], site.start[1]], {
@@ -76,6 +74,9 @@ export function fromGeoJson(document: FeatureCollection): Site {
         site.routes.push({
           name: String(feature.properties.name ?? `Route ${site.routes.length + 1}`),
           nodes: points(coordinates, where),
+          ...(typeof feature.properties.heading === "number"
+            ? { heading: feature.properties.heading }
+            : {}),
         });
         break;
       case "landmark": {

@@ -15,6 +15,8 @@ export interface Landmark {
 export interface Route {
   name: string;
   nodes: Point[];
+  /** How the robot is to stand at the last node, radians. */
+  heading?: number;
 }
 
 export type Start = [number, number] | [number, number, number];
@@ -93,10 +95,16 @@ function whatIsWrong(site: { [key in keyof Site]: unknown }): string | null {
 /** Without fields that say nothing: the server answers null where a landmark has no own size. */
 function clean(site: Site): Site {
   const { start, ...rest } = site;
-  const landmarks = site.landmarks.map((mark) =>
-    Object.fromEntries(Object.entries(mark).filter(([, value]) => value !== null)),
-  ) as unknown as Landmark[];
-  return { ...rest, landmarks, ...(start ? { start } : {}) };
+  const said = <T extends object>(things: T[]): T[] =>
+    things.map(
+      (thing) => Object.fromEntries(Object.entries(thing).filter(([, v]) => v !== null)) as T,
+    );
+  return {
+    ...rest,
+    landmarks: said(site.landmarks),
+    routes: said(site.routes),
+    ...(start ? { start } : {}),
+  };
 }
 
 export const isRing = (kind: Kind): boolean =>

@@ -71,7 +71,7 @@ export function paintSite(paper: Paper, site: Site, look: SiteLook = {}): void {
   });
   if (look.routes !== false) {
     site.routes.forEach((route, i) => {
-      paintRoute(paper, route.nodes, route.name, is(selection, "route", i));
+      paintRoute(paper, route, is(selection, "route", i));
     });
   }
   if (site.start) paintStart(paper, site.start, is(selection, "start"));
@@ -99,8 +99,9 @@ function paintNoGo(paper: Paper, ring: readonly Point[], chosen: boolean): void 
   }
 }
 
-function paintRoute(paper: Paper, nodes: readonly Point[], name: string, chosen: boolean): void {
-  const { palette } = paper;
+function paintRoute(paper: Paper, route: Site["routes"][number], chosen: boolean): void {
+  const { palette, resolution } = paper;
+  const { nodes, name, heading } = route;
   const color = chosen ? palette.accent : palette.quiet;
   line(paper, nodes, { color, width: chosen ? 3 : 2, dash: [2, 5] });
   for (const mark of marksAlong(nodes, 2)) arrow(paper, mark.at, mark.angle, color);
@@ -112,6 +113,12 @@ function paintRoute(paper: Paper, nodes: readonly Point[], name: string, chosen:
   if (nodes.length > 0) {
     const [x, y] = paper.at(nodes[0]);
     words(paper, name, [x, y - 18], { color, bold: chosen });
+  }
+  if (nodes.length > 0 && heading !== undefined) {
+    const [x, y] = nodes[nodes.length - 1];
+    const ahead = 15 * resolution;
+    const tip: Point = [x + ahead * Math.cos(heading), y + ahead * Math.sin(heading)];
+    arrow(paper, tip, heading, color, 6);
   }
 }
 

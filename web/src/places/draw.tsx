@@ -160,6 +160,25 @@ function StartFields({ drawn }: { drawn: Site }) {
   );
 }
 
+function RouteFields({ drawn, index }: { drawn: Site; index: number }) {
+  const route = drawn.routes[index];
+  const set = (next: typeof route) =>
+    change({ ...drawn, routes: drawn.routes.map((old, i) => (i === index ? next : old)) });
+  const { heading, ...rest } = route;
+  return (
+    <>
+      <TextField label="Name" value={route.name} onCommit={(name) => set({ ...route, name })} />
+      <NumberField
+        label="Heading at the end"
+        unit="angle"
+        optional
+        value={heading ?? null}
+        onCommit={(value) => set(value === null ? rest : { ...rest, heading: value })}
+      />
+    </>
+  );
+}
+
 function Selected({ drawn, at }: { drawn: Site; at: Selection }) {
   const points = vertices(drawn, at);
   return (
@@ -168,18 +187,7 @@ function Selected({ drawn, at }: { drawn: Site; at: Selection }) {
         <h3>{title(drawn, at)}</h3>
         <IconButton icon="close" label="Deselect" onClick={() => select(null)} />
       </div>
-      {at.kind === "route" && (
-        <TextField
-          label="Name"
-          value={drawn.routes[at.index].name}
-          onCommit={(name) =>
-            change({
-              ...drawn,
-              routes: drawn.routes.map((route, i) => (i === at.index ? { ...route, name } : route)),
-            })
-          }
-        />
-      )}
+      {at.kind === "route" && <RouteFields drawn={drawn} index={at.index} />}
       {at.kind === "landmark" && <LandmarkFields drawn={drawn} index={at.index} />}
       {at.kind === "start" && <StartFields drawn={drawn} />}
       {points.length > 1 && (

@@ -23,6 +23,8 @@ Curve = tuple[Piece, ...]
 
 CHANGE = 0.5
 """What a change of gear costs, as metres of path."""
+_MOST = 8
+"""So many curves between two poses are worked out."""
 STEP = math.radians(5.0)
 """Arcs are drawn with a vertex at least every so many radians."""
 
@@ -118,18 +120,36 @@ def shortest_curves(start: Pose2D, goal: Pose2D, radius: float, change: float) -
 
 @lru_cache(maxsize=20_000)
 def _curves(x: float, y: float, turn: float, change: float) -> tuple[Curve, ...]:
-    found: dict[tuple[tuple[str, float], ...], Curve] = {}
+    """The ``_MOST`` best for radius 1; only those that are looked at are driven."""
+    found: dict[tuple[tuple[str, float], ...], float] = {}
     for curve in _words(x, y, turn):
         short = tuple((kind, length) for kind, length in curve if abs(length) > 1e-7)
-        pose = Pose2D(0.0, 0.0, 0.0)
-        for piece in short:
-            pose = drive(pose, piece, 1.0)
-        off = math.hypot(pose.x - x, pose.y - y) + abs(wrap_angle(pose.heading - turn))
-        if off < 1e-6 and short:
-            found[tuple((kind, round(length, 6)) for kind, length in short)] = short
-    return tuple(
-        sorted(found.values(), key=lambda c: (curve_length(c) + change * gear_changes(c), c))
-    )
+        if short:
+            found[short] = curve_length(short) + change * gear_changes(short)
+    best: dict[tuple[tuple[str, float], ...], Curve] = {}
+    for curve in sorted(found, key=lambda curve: (found[curve], curve)):
+        name = tuple((kind, round(length, 6)) for kind, length in curve)
+        if name not in best and _arrives(curve, x, y, turn):
+            best[name] = curve
+            if len(best) == _MOST:
+                break
+    return tuple(best.values())
+
+
+def _arrives(curve: Curve, x: float, y: float, turn: float) -> bool:
+    """Whether the curve, driven from the origin with radius 1, ends in the pose x, y, turn."""
+    here_x, here_y, heading = 0.0, 0.0, 0.0
+    for kind, length in curve:
+        sin, cos = math.sin(heading), math.cos(heading)
+        if kind == "S":
+            here_x += length * cos
+            here_y += length * sin
+            continue
+        side = 1.0 if kind == "L" else -1.0
+        heading += side * length
+        here_x += side * (math.sin(heading) - sin)
+        here_y -= side * (math.cos(heading) - cos)
+    return math.hypot(here_x - x, here_y - y) + abs(wrap_angle(heading - turn)) < 1e-6
 
 
 def _words(x: float, y: float, turn: float) -> Iterator[Curve]:

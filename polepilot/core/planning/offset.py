@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely import LineString, Polygon
 
-from polepilot.core.planning.space import FreeSpace, polygons, quadrant
+from polepilot.core.planning.space import MARGIN, FreeSpace, polygons, quadrant
 from polepilot.core.site import Site
 
 Points = NDArray[np.float64]
@@ -19,6 +19,9 @@ OVERLAP = 0.06
 """Neighbouring passes overlap by at least this share of the tool width."""
 _MOST_CUTS = 8
 """How often a bent patch is halved before it is taken as it is."""
+_COARSE = 0.0005
+"""How far an outermost loop of many corners is taken inside to have fewer, m."""
+_FINE = 0.005
 _THIN = 0.1
 """A piece thinner than this share of the tool width is driven once, not around."""
 
@@ -46,7 +49,7 @@ def sharp_space(site: Site, space: FreeSpace, poles: list[tuple[float, float]]) 
 
     It is a part of the free space; in tight places it is less than that.
     """
-    radius = space.clearance + 0.0006
+    radius = space.clearance + MARGIN
     sharp = space.floor.buffer(-radius, join_style="mitre", mitre_limit=2.0)
     things = [LineString(wall) for wall in site.walls]
     if things:
@@ -67,7 +70,7 @@ def nested_loops(
     """The outlines of ``pieces``, and loops inside of them a little less than a tool width apart.
 
     ``tolerance``: how far inner loops may be from the exact offset, metres, where that saves
-    vertices; the outermost ones keep to 1 mm and stay inside. ``closer``: loops may lie this
+    vertices; the outermost ones are exact. ``closer``: loops may lie this
     many times their largest distance apart, or 0: as it fits the widest place best.
     """
     loops: list[Stroke] = []
@@ -92,6 +95,10 @@ def nested_loops(
     return loops
 
 
+def _corner_count(shape: shapely.Geometry) -> int:
+    return int(shapely.get_num_coordinates(shape))
+
+
 def _fitted_step(piece: Polygon, tool_width: float, largest: float) -> float:
     """The distance between loops that lets them end well in the widest place of the piece."""
     widest = float(shapely.maximum_inscribed_circle(piece, tolerance=0.01).length)
@@ -103,7 +110,10 @@ def _fitted_step(piece: Polygon, tool_width: float, largest: float) -> float:
 
 def _rings(polygon: Polygon, depth: int, tolerance: float) -> list[Stroke]:
     if depth == 0:
-        inner = polygon.buffer(-0.0008, join_style="mitre").simplify(0.0008)
+        inner = polygon
+        few = polygon.buffer(-_COARSE, join_style="mitre").simplify(_COARSE)
+        if tolerance > _FINE and _corner_count(few) < _corner_count(polygon) / 2:
+            inner = few  # a wheel follows few corners better than many
     else:
         inner = polygon.simplify(tolerance)
     if inner.is_empty or not inner.is_valid:

@@ -18,15 +18,31 @@ from polepilot.core.planning.wording import in_words, measured_in_words
 from polepilot.core.site import Site, Start
 from polepilot.core.site_file import place
 
-CHORD = 0.0003
+CHORD = 0.00005
 """How far the chords of a rounded outline are inside of it, at most, m."""
-SLACK = 0.0002
+SLACK = 0.00002
 """How far outside the free space a line may seem to be through rounding, m."""
-MARGIN = CHORD + SLACK + 0.0001
+MARGIN = CHORD + SLACK + 0.00008
 """How much farther than the clearance the path stays away, so that it keeps it in spite of those
 and of the digits in which it is written, m."""
+_TOLERANCES = (0.005, 0.02, 0.05, 0.1, 0.2)
+"""How exactly corners are taken when a way is looked for, m."""
+_MOST_CORNERS = 400
 POLE_GAP = 0.01
 """A pole whose surface is farther than this from everything stands free, m."""
+
+
+@dataclass(slots=True, eq=False)
+class _Graph:
+    """Corners around which shortest paths bend, and what was seen from them so far."""
+
+    tolerance: float
+    """How exactly the corners are taken, m; 0: those of the free space itself."""
+    nodes: NDArray[np.float64]
+    """N x 2."""
+    arms: NDArray[np.float64]
+    """N x 2 x 2: from each corner along its two sides."""
+    seen: dict[int, tuple[NDArray[np.intp], NDArray[np.float64]]] = field(default_factory=dict)
 
 
 @dataclass(slots=True, eq=False)
@@ -46,13 +62,8 @@ class FreeSpace:
     """Inside ``polygon``."""
     notes: list[str] = field(default_factory=list)
     _loose: Polygon = field(init=False)
-    _nodes: NDArray[np.float64] | None = field(init=False, default=None)
-    _seen: dict[int, tuple[NDArray[np.intp], NDArray[np.float64]]] = field(
-        init=False, default_factory=dict
-    )
-
-    _exact: bool = field(init=False, default=False)
-    """The corners are those of ``polygon`` itself."""
+    _graphs: list[_Graph] = field(init=False, default_factory=list)
+    """Coarse ones first; each is made when the one before it knows no way."""
 
     def __post_init__(self) -> None:
         self._loose = self.polygon.buffer(SLACK, join_style="mitre")
@@ -91,24 +102,29 @@ class FreeSpace:
         """
         if self.holds(LineString([a, b])):
             return [a, b]
-        way = self._search(a, b)
-        if way is None and not self._exact:
-            # The corners are taken a little inside, which closes the narrowest necks.
-            self._exact = True
-            corners = [corner for part in polygons(self.polygon) for corner in _reflex(part)]
-            self._nodes = np.array(corners, dtype=float).reshape(-1, 2)
-            self._seen.clear()
-            way = self._search(a, b)
-        return way
+        # Coarse corners lie a little inside, which closes the narrowest necks.
+        level = 0
+        while True:
+            if level == len(self._graphs):
+                before = self._graphs[-1].tolerance if self._graphs else math.inf
+                if before == 0:
+                    return None
+                self._graphs.append(self._graph(before))
+            way = self._search(a, b, self._graphs[level])
+            if way is not None:
+                return way
+            level += 1
 
-    def _search(self, a: geometry.Point, b: geometry.Point) -> list[geometry.Point] | None:
+    def _search(
+        self, a: geometry.Point, b: geometry.Point, graph: _Graph
+    ) -> list[geometry.Point] | None:
         """A* from ``a`` to ``b`` over the corners."""
-        nodes = self._bends()
+        nodes = graph.nodes
         count = len(nodes)
         points = np.vstack([nodes, [a], [b]])
         goal = count + 1
         to_goal = np.hypot(*(points - points[goal]).T)
-        sees_goal = set(self._visible(points, goal, nodes)[0].tolist())
+        sees_goal = set(self._visible(points[goal], graph)[0].tolist())
         cost = {count: 0.0}
         came: dict[int, int] = {}
         queue = [(float(to_goal[count]), count)]
@@ -124,11 +140,11 @@ class FreeSpace:
                 return [(float(points[i, 0]), float(points[i, 1])) for i in reversed(trail)]
             closed.add(here)
             if here < count:
-                if here not in self._seen:
-                    self._seen[here] = self._visible(points, here, nodes)
-                near, lengths = self._seen[here]
+                if here not in graph.seen:
+                    graph.seen[here] = self._visible(points[here], graph, here)
+                near, lengths = graph.seen[here]
             else:
-                near, lengths = self._visible(points, here, nodes)
+                near, lengths = self._visible(points[here], graph)
             steps = list(zip(near.tolist(), lengths.tolist(), strict=True))
             if here in sees_goal:
                 steps.append((goal, float(to_goal[here])))
@@ -140,29 +156,44 @@ class FreeSpace:
                     heapq.heappush(queue, (total + float(to_goal[there]), there))
         return None
 
-    def _bends(self) -> NDArray[np.float64]:
-        """Corners of the free space that point into it; shortest paths bend only there."""
-        if self._nodes is None:
-            for tolerance in (0.001, 0.005, 0.02, 0.05, 0.1, 0.2):
-                inner = self.polygon.buffer(-tolerance / 2, join_style="mitre").simplify(
-                    tolerance / 2
-                )
-                found = [corners for part in polygons(inner) for corners in _reflex(part)]
-                if len(found) <= 400:
-                    break
-            self._nodes = np.array(found, dtype=float).reshape(-1, 2)
-        return self._nodes
+    def _graph(self, coarser: float) -> _Graph:
+        """Corners of the free space that point into it; shortest paths bend only there.
+
+        First the finest ones that are not too many, later (a finite ``coarser``) all of them.
+        """
+        if not math.isinf(coarser):
+            return _graph_of(0.0, self.polygon)
+        for tolerance in _TOLERANCES:
+            inner = self.polygon.buffer(-tolerance / 2, join_style="mitre").simplify(tolerance / 2)
+            chosen = _graph_of(tolerance, inner)
+            if len(chosen.nodes) <= _MOST_CORNERS:
+                break
+        return chosen
 
     def _visible(
-        self, points: NDArray[np.float64], index: int, nodes: NDArray[np.float64]
+        self, here: NDArray[np.float64], graph: _Graph, index: int | None = None
     ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Which nodes are seen from a point, and how far away they are."""
-        here = points[index]
-        pairs = np.stack([np.broadcast_to(here, nodes.shape), nodes], axis=1)
-        lengths = np.hypot(*(nodes - here).T)
-        seen = np.flatnonzero(shapely.covers(self._loose, shapely.linestrings(pairs)))
-        seen = seen[(seen != index) & (lengths[seen] > 1e-9)]
+        """Which corners are seen from a point, and how far away they are.
+
+        Only those past which a shortest path from there can lead: that touch the line of sight,
+        and are touched by it (``index``: the point is that corner).
+        """
+        sights = graph.nodes - here
+        useful = _touched(sights, graph.arms)
+        if index is not None:
+            useful &= _touched(sights, graph.arms[index])
+        lengths = np.hypot(*sights.T)
+        near = np.flatnonzero(useful & (lengths > 1e-9))
+        pairs = np.stack([np.broadcast_to(here, (len(near), 2)), graph.nodes[near]], axis=1)
+        seen = near[shapely.covers(self._loose, shapely.linestrings(pairs))]
         return seen, lengths[seen]
+
+
+def _touched(sights: NDArray[np.float64], arms: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Where both sides of a corner lie on the same side of a line of sight."""
+    first = sights[:, 0] * arms[..., 0, 1] - sights[:, 1] * arms[..., 0, 0]
+    second = sights[:, 0] * arms[..., 1, 1] - sights[:, 1] * arms[..., 1, 0]
+    return np.asarray(first * second >= -1e-12)
 
 
 def free_space(site: Site, options: PlanOptions) -> FreeSpace:
@@ -264,17 +295,20 @@ def _default_start(home: Polygon) -> geometry.Point:
     return (float(middle[0]), float(middle[1]))
 
 
-def _reflex(polygon: Polygon) -> list[geometry.Point]:
-    """Vertices of a polygon at which its inside has more than half a turn."""
-    found: list[geometry.Point] = []
-    for index, ring in enumerate((polygon.exterior, *polygon.interiors)):
-        points = np.asarray(ring.coords)[:-1]
-        if (index == 0) != ring.is_ccw:
-            points = points[::-1]  # now the inside is on the left everywhere
-        before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
-        turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-        found += [(float(x), float(y)) for x, y in points[turn < 0]]
-    return found
+def _graph_of(tolerance: float, shape: shapely.Geometry) -> _Graph:
+    """The corners of a shape at which its inside has more than half a turn."""
+    nodes: list[NDArray[np.float64]] = [np.zeros((0, 2))]
+    arms: list[NDArray[np.float64]] = [np.zeros((0, 2, 2))]
+    for polygon in polygons(shape):
+        for index, ring in enumerate((polygon.exterior, *polygon.interiors)):
+            points = np.asarray(ring.coords)[:-1, :2]
+            if (index == 0) != ring.is_ccw:
+                points = points[::-1]  # now the inside is on the left everywhere
+            back, ahead = np.roll(points, 1, axis=0) - points, np.roll(points, -1, axis=0) - points
+            into = back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0] > 0
+            nodes.append(points[into])
+            arms.append(np.stack([back, ahead], axis=1)[into])
+    return _Graph(tolerance, np.vstack(nodes), np.vstack(arms))
 
 
 def quadrant(radius: float, error: float = CHORD) -> int:

@@ -51,9 +51,28 @@ class Turn:
         return joined((("S", before + self.lead), *self.curve))
 
 
-@lru_cache(maxsize=4000)
 def turns_round(turn: float, radius: float) -> tuple[Turn, ...]:
     """Ways round a corner of ``turn`` radians, the cheapest first."""
+    return _left_turns(turn, radius) if turn >= 0 else _right_turns(-turn, radius)
+
+
+@lru_cache(maxsize=4000)
+def _right_turns(turn: float, radius: float) -> tuple[Turn, ...]:
+    """The mirror images of those to the left."""
+    side = {"L": "R", "R": "L", "S": "S"}
+    return tuple(
+        replace(
+            way,
+            curve=tuple((side[kind], length) for kind, length in way.curve),
+            points=way.points * (1.0, -1.0),
+        )
+        for way in _left_turns(turn, radius)
+    )
+
+
+@lru_cache(maxsize=4000)
+def _left_turns(turn: float, radius: float) -> tuple[Turn, ...]:
+    """Ways round a corner of ``turn`` radians to the left, the cheapest first."""
     legs = radius * math.tan(min(abs(turn), math.radians(120)) / 2)
     out = np.array([math.cos(turn), math.sin(turn)])
     ways: list[Turn] = []

@@ -160,8 +160,9 @@ def test_missed_patches_are_planned_alone() -> None:
 
 def test_orders() -> None:
     site = maps.NAMED["neck"]()
-    short = plan_scan(site, PlanOptions(min_turn_radius=0))
-    paper = plan_scan(site, PlanOptions(min_turn_radius=0, order="paper"))
+    start = Start(1.5, 1.2)
+    short = plan_scan(site, PlanOptions(min_turn_radius=0, start=start))
+    paper = plan_scan(site, PlanOptions(min_turn_radius=0, order="paper", start=start))
     assert short.predicted.length <= paper.predicted.length
     kinds = [part.kind for part in paper.parts]
     assert kinds[0] == "link"

@@ -13,6 +13,7 @@ from shapely import LineString, MultiPolygon, Point, Polygon
 
 from polepilot.core import geometry
 from polepilot.core.errors import PlanError
+from polepilot.core.planning.footprint import Footprint
 from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.wording import in_words, measured_in_words
 from polepilot.core.site import Site, Start
@@ -81,8 +82,7 @@ class FreeSpace:
 
     def reachable(self) -> MultiPolygon:
         """The union of the clearance discs whose centres are in ``polygon``."""
-        radius = self.clearance + MARGIN  # as much as the walls were grown by
-        discs = self.polygon.buffer(radius, quad_segs=quadrant(radius))
+        discs = footprint(self.clearance).ground(self.polygon)
         if not discs.is_valid:  # where arcs nearly touch each other, GEOS may let them cross
             discs = shapely.make_valid(discs, method="structure", keep_collapsed=False)
         return as_multi(discs)
@@ -205,14 +205,9 @@ def free_space(site: Site, options: PlanOptions) -> FreeSpace:
     floor = site.floor()
     if not floor.is_valid:
         floor = shapely.make_valid(floor)
-    radius = options.clearance + MARGIN
-    segments = quadrant(radius)
-    free = floor.buffer(-radius, quad_segs=segments)
     things = [LineString(wall) for wall in site.walls]
     things += [Point(pole) for pole in free_poles(site)]
-    if things:
-        discs = shapely.buffer(np.array(things), radius, quad_segs=segments)
-        free = free.difference(shapely.union_all(discs))
+    free = footprint(options.clearance).places(floor, things)
     pieces = sorted(
         (piece for piece in polygons(free) if piece.area > 1e-6), key=lambda p: -float(p.area)
     )
@@ -238,6 +233,11 @@ def free_space(site: Site, options: PlanOptions) -> FreeSpace:
         start=start,
         notes=notes,
     )
+
+
+def footprint(clearance: float) -> Footprint:
+    """The robot as plans see it: the disc that keeps ``clearance``, and the margin."""
+    return Footprint(clearance + MARGIN, CHORD)
 
 
 def free_poles(site: Site) -> list[geometry.Point]:
@@ -313,9 +313,7 @@ def _graph_of(tolerance: float, shape: shapely.Geometry) -> _Graph:
 
 def quadrant(radius: float, error: float = CHORD) -> int:
     """Segments per quarter turn so that a buffer's chords are no farther than ``error`` inside."""
-    if radius <= 2 * error:
-        return 4
-    return max(8, min(128, math.ceil(math.pi / 4 / math.acos(1 - error / radius))))
+    return Footprint(radius, error).quadrant
 
 
 def polygons(shape: shapely.Geometry) -> list[Polygon]:

@@ -160,6 +160,7 @@ def _summary(result: Plan) -> str:
     ]
     if result.mode == "scan":
         lines.insert(0, f"coverage   {predicted.coverage * 100:.1f} % of {result.area.area:.1f} m²")
+        lines.insert(1, f"overlap    {predicted.overlap * 100:.1f} %")
     for piece in result.unreachable:
         x, y = (sum(values) / len(piece.polygon) for values in zip(*piece.polygon, strict=True))
         lines.append(f"unreachable near ({x:.2f}, {y:.2f}): {piece.reason}")

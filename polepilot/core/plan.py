@@ -41,6 +41,9 @@ class Prediction:
     length: float
     duration: float
     reversals: int
+    overlap: float = 0.0
+    """Share of the strip under the tool that falls on floor which was swept before, 0 to 1; 0 for
+    routes and for plans kept by older versions."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,6 +95,7 @@ class Plan:
                 "length": self.predicted.length,
                 "duration": self.predicted.duration,
                 "reversals": self.predicted.reversals,
+                "overlap": self.predicted.overlap,
             },
             "nodes": [list(node) for node in self.nodes],
             "notes": list(self.notes),

@@ -208,6 +208,8 @@ class Prediction(Model):
     length: float
     duration: float
     reversals: int
+    overlap: float = 0.0
+    """Share of the strip under the tool that falls on floor which was swept before."""
 
 
 class PlanRecord(Model):

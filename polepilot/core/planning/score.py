@@ -24,18 +24,22 @@ def predict(
     options: PlanOptions,
     swept: shapely.Geometry | None = None,
 ) -> Prediction:
-    """Coverage of ``area`` (1 where there is none), metres, seconds, changes of gear."""
-    coverage = 1.0
-    if not area.is_empty:
-        if swept is None:
-            swept = swept_shape(path, options.tool_width)
-        coverage = float(min(1.0, shapely.intersection(area, swept).area / area.area))
+    """Coverage of ``area`` (1 where there is none), metres, seconds, changes of gear, overlap."""
     steps = np.hypot(*np.diff(path, axis=0).T)
+    coverage, overlap = 1.0, 0.0
+    if not area.is_empty:
+        tool = options.tool_width
+        if swept is None:
+            swept = swept_shape(path, tool)
+        coverage = float(min(1.0, shapely.intersection(area, swept).area / area.area))
+        strip = steps.sum() * tool + math.pi * tool**2 / 4
+        overlap = float(max(0.0, 1.0 - swept.area / strip))
     return Prediction(
         coverage=coverage,
         length=float(steps.sum()),
         duration=_duration(path, gear, steps, options),
         reversals=int(np.count_nonzero(np.diff(gear))),
+        overlap=overlap,
     )
 
 

@@ -172,6 +172,15 @@ def test_orders() -> None:
             assert paper.path[part.first] == pytest.approx(paper.path[part.last], abs=1e-6)
 
 
+def test_overlap_is_what_the_strip_has_more_than_the_floor() -> None:
+    site = maps.NAMED["room"]()
+    plan = plan_scan(site, PlanOptions(min_turn_radius=0))
+    strip = plan.predicted.length * 0.4 + np.pi * 0.2**2
+    swept = plan.predicted.coverage * plan.area.area
+    assert plan.predicted.overlap == pytest.approx(1 - swept / strip, abs=0.003)
+    assert 0.0 < plan.predicted.overlap < 0.2
+
+
 def test_the_same_twice() -> None:
     site = maps.office()
     first, second = (plan_scan(site, PlanOptions()) for _ in range(2))

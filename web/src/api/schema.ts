@@ -1036,6 +1036,11 @@ export interface components {
             duration: number;
             /** Length */
             length: number;
+            /**
+             * Overlap
+             * @default 0
+             */
+            overlap: number;
             /** Reversals */
             reversals: number;
         };

@@ -123,7 +123,7 @@ function Unreachable({ record }: { record: PlanRecord }) {
 }
 
 function Predicted({ record }: { record: PlanRecord }) {
-  const { coverage, length: metres, duration: seconds, reversals } = record.predicted;
+  const { coverage, length: metres, duration: seconds, reversals, overlap } = record.predicted;
   const scan = record.mode === "scan";
   return (
     <>
@@ -136,6 +136,7 @@ function Predicted({ record }: { record: PlanRecord }) {
       <Facts>
         <Fact name="Length">{length(metres)}</Fact>
         {scan && <Fact name="Duration">{duration(seconds)}</Fact>}
+        {scan && <Fact name="Driven twice">{percent(overlap)}</Fact>}
         <Fact name="Reversals">{reversals}</Fact>
         <Fact name="Tool width">{length(record.tool_width)}</Fact>
         <Fact name="Clearance">{length(record.clearance)}</Fact>

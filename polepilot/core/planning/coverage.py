@@ -15,8 +15,10 @@ from shapely import MultiPolygon, Polygon
 from polepilot.core.errors import PlanError
 from polepilot.core.geometry import Pose2D, wrap_angle
 from polepilot.core.plan import PartKind, Plan, PlanPart
+from polepilot.core.planning.bumps import short_bumps, with_bumps
 from polepilot.core.planning.driver import Driver
 from polepilot.core.planning.offset import (
+    OVERLAP,
     Points,
     Stroke,
     cleanup_strokes,
@@ -26,7 +28,7 @@ from polepilot.core.planning.offset import (
 from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.order import Run, ordered_runs
 from polepilot.core.planning.score import predict
-from polepilot.core.planning.space import FreeSpace, as_multi, free_poles, free_space
+from polepilot.core.planning.space import FreeSpace, as_multi, free_poles, free_space, polygons
 from polepilot.core.planning.swept import swept_shape
 from polepilot.core.planning.unreachable import unreachable_pieces
 from polepilot.core.planning.wording import in_words
@@ -40,6 +42,12 @@ LONGEST = 200_000.0
 """A plan longer than this would not be a day's work but a year's, metres."""
 _CLOSER = (1.0, 0.0, 0.95, 0.9)
 """Spacings that are tried; see ``nested_loops``."""
+_TOUCH = 0.004
+"""How much loops overlap where bumps sweep what is left between them."""
+_GAP = 0.55
+"""Tool widths between the two crossings from a loop to another and back."""
+_LEAST = 0.004
+"""Missed patches smaller than this share of the tool's square get no bump."""
 _MANY = 60
 _SMALLEST = 0.008
 """Missed patches below this are left, m² for a tool of 0.4 m; scaled with its square."""
@@ -79,7 +87,12 @@ def plan_scan(
         strokes = [_least_stroke(space)]
     report(0.3, "order")
     runs = ordered_runs(
-        strokes, space.start.position, space, options.order, reach=options.tool_width
+        strokes,
+        space.start.position,
+        space,
+        options.order,
+        reach=options.tool_width,
+        gap=0.0 if options.min_turn_radius > 0 else _GAP * options.tool_width,
     )
     report(0.5, "path")
     notes = [*site.repairs, *space.notes]
@@ -144,9 +157,10 @@ def _strokes(
         return _completed(loops, space, target, tool, smallest)
     best: list[Stroke] = []
     least = math.inf
-    for closer in _CLOSER:
-        loops = nested_loops(pieces, tool, tolerance, closer)
-        strokes = _completed(loops, space, target, tool, smallest)
+    plain = options.min_turn_radius <= 0
+    for closer in _CLOSER[:2] if plain else _CLOSER:
+        loops = nested_loops(pieces, tool, tolerance, closer, _TOUCH if plain else OVERLAP)
+        strokes = _completed(loops, space, target, tool, smallest, bumps=plain)
         # Each clean-up pass has to be gone to and left again.
         extra = 2 * tool * (1 + (options.min_turn_radius > 0))
         cost = sum(s.line.length + (0.0 if s.closed else extra) for s in strokes)
@@ -158,9 +172,17 @@ def _strokes(
 
 
 def _completed(
-    loops: list[Stroke], space: FreeSpace, target: MultiPolygon, tool: float, smallest: float
+    loops: list[Stroke],
+    space: FreeSpace,
+    target: MultiPolygon,
+    tool: float,
+    smallest: float,
+    bumps: bool = False,
 ) -> list[Stroke]:
-    """Loops with the clean-up passes for what they miss of ``target``."""
+    """Loops with the clean-up passes for what they miss of ``target``.
+
+    ``bumps``: without those patches to which bumps of the path will be shorter.
+    """
     strokes = list(loops)
     for _ in range(2):
         missed = target
@@ -168,6 +190,11 @@ def _completed(
             lines = [np.vstack([s.points, s.points[:1]]) if s.closed else s.points for s in strokes]
             shapes = [swept_shape(line, tool) for line in lines]
             missed = target.difference(shapely.union_all(shapes))
+            if bumps:
+                opened = missed.buffer(-0.002, quad_segs=2).buffer(0.002, quad_segs=2)
+                missed = as_multi(
+                    MultiPolygon([p for p in polygons(opened) if not short_bumps(p, tool)])
+                )
         more = cleanup_strokes(missed, tool, space, smallest)
         strokes += more
         if not more:
@@ -219,7 +246,14 @@ def _path(
     notes: list[str],
 ) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
     if options.min_turn_radius <= 0:
-        return _plain_path(runs, space, options, notes)
+        path, _, parts = _plain_path(runs, space, options, notes)
+        tool = options.tool_width
+        for _ in range(2):
+            missed = target.difference(swept_shape(path, tool))
+            path, parts = with_bumps(
+                path, parts, target, missed, space, tool, _LEAST * tool**2, options.order == "paper"
+            )
+        return path, np.ones(len(path) - 1, np.int8), parts
     return _driven_path(runs, space, options, target, notes)
 
 

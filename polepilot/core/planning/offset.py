@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import shapely
@@ -65,17 +66,27 @@ def sharp_space(site: Site, space: FreeSpace, poles: list[tuple[float, float]]) 
 
 
 def nested_loops(
-    pieces: list[Polygon], tool_width: float, tolerance: float, closer: float = 1.0
+    pieces: list[Polygon],
+    tool_width: float,
+    tolerance: float,
+    closer: float = 1.0,
+    overlap: float = OVERLAP,
 ) -> list[Stroke]:
     """The outlines of ``pieces``, and loops inside of them a little less than a tool width apart.
 
     ``tolerance``: how far inner loops may be from the exact offset, metres, where that saves
     vertices; the outermost ones are exact. ``closer``: loops may lie this
-    many times their largest distance apart, or 0: as it fits the widest place best.
+    many times their largest distance apart, or 0: as it fits the widest place best. ``overlap``:
+    of neighbours, as a share of the tool's width; below ``OVERLAP`` loops are round about corners
+    that point into the free space, which leaves nothing between them there.
     """
+    if overlap < OVERLAP:
+        joins: dict[str, Any] = {"join_style": "round"}
+    else:
+        joins = {"join_style": "mitre", "mitre_limit": 1.5}
     loops: list[Stroke] = []
     for piece in pieces:
-        largest = tool_width * (1 - OVERLAP)
+        largest = tool_width * (1 - overlap)
         step = closer * largest if closer > 0 else _fitted_step(piece, tool_width, largest)
         level = [piece]
         depth = 0
@@ -84,11 +95,9 @@ def nested_loops(
             for polygon in level:
                 if not polygon.buffer(-_THIN * tool_width / 2).is_empty:
                     loops += _rings(polygon, depth, tolerance)
-                    inner = polygon.buffer(
-                        -step, join_style="mitre", mitre_limit=1.5, quad_segs=quadrant(step)
-                    )
+                    inner = polygon.buffer(-step, quad_segs=quadrant(step, 0.0005), **joins)
                     following += [
-                        part.simplify(0.001) for part in polygons(inner) if part.area > 1e-4
+                        part.simplify(0.0005) for part in polygons(inner) if part.area > 1e-4
                     ]
             level = [part for part in following if part.is_valid and not part.is_empty]
             depth += 1

@@ -89,10 +89,20 @@ static void fail(const char *why)
 
 /* ---- the line */
 
+static uint8_t held_back; /* simavr reads a byte of its own queue only after the one before */
+
+static void hold_back(avr_irq_t *irq, uint32_t value, void *param)
+{
+    (void)irq;
+    if (value != 0u) {
+        held_back = param != NULL;
+    }
+}
+
 static avr_cycle_count_t next_byte(avr_t *chip, avr_cycle_count_t when, void *param)
 {
     (void)param;
-    if (received_first < received_end) {
+    if (!held_back && received_first < received_end) {
         avr_raise_irq(avr_io_getirq(chip, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT),
                       received[received_first]);
         received_first++;
@@ -114,10 +124,9 @@ static void take_bytes(uint64_t total)
 {
     time_t deadline = time(NULL) + PATIENCE_S;
 
-    if (received_first == received_end) {
-        received_first = 0u;
-        received_end = 0u;
-    }
+    received_end -= received_first;
+    memmove(received, &received[received_first], received_end);
+    received_first = 0u;
     while (received_total < total) {
         size_t count = pty_read(&received[received_end], sizeof received - received_end);
 
@@ -252,6 +261,7 @@ static avr_cycle_count_t wake_up(avr_t *chip, avr_cycle_count_t when, void *para
 static void count_reset(avr_t *chip)
 {
     starts++;
+    held_back = 0u;
     if (reset_of_chip != NULL) {
         reset_of_chip(chip);
     }
@@ -337,6 +347,10 @@ static void start(const char *chip, const char *program)
     (void)avr_ioctl(avr, AVR_IOCTL_UART_SET_FLAGS('0'), &flags);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT),
                             from_chip, NULL);
+    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUT_XON),
+                            hold_back, NULL);
+    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUT_XOFF),
+                            hold_back, &held_back);
     avr_cycle_timer_register(avr, cycles_per_byte, next_byte, NULL);
 }
 

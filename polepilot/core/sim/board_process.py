@@ -45,11 +45,13 @@ class BoardProcess:
         self._descriptor = -1
         self._folder = tempfile.TemporaryDirectory(prefix="polepilot-board-")
         link = Path(self._folder.name) / "line"
+        self._complaints = Path(self._folder.name) / "complaints"
         words = [word.replace(LINK, str(link)) for word in command]
         try:
-            self._program = subprocess.Popen(
-                words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-            )
+            with self._complaints.open("wb") as complaints:
+                self._program = subprocess.Popen(
+                    words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=complaints
+                )
         except OSError as error:
             self._folder.cleanup()
             raise LinkError(f"{words[0]}: cannot be started ({error.strerror}).") from error
@@ -125,7 +127,7 @@ class BoardProcess:
         if self._descriptor >= 0:
             os.close(self._descriptor)
         streams: list[IO[bytes] | None] = [self._program.stdin, self._program.stdout]
-        for stream in [*streams, self._program.stderr]:
+        for stream in streams:
             if stream is not None:
                 with contextlib.suppress(OSError):
                     stream.close()
@@ -161,12 +163,10 @@ class BoardProcess:
         return sent
 
     def _ended(self) -> LinkError:
-        assert self._program.stderr is not None
-        said = b""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._program.wait(1.0)
-            said = self._program.stderr.read()
-        reason = said.decode(errors="replace").strip() or f"status {self._program.returncode}"
+        said = self._complaints.read_text("utf-8", "replace").strip()
+        reason = said or f"status {self._program.returncode}"
         return LinkError(f"the board's program has ended ({reason}).", remedy="Start again.")
 
 

@@ -10,7 +10,9 @@
 #define LONE 0.75f       /* share of the light that a single bright segment keeps */
 #define LEAST_RISE 5.0f  /* grey levels from a fence to the end bar beside it */
 #define COARSE 0.33f     /* of a segment, or a row: by so much differ the lengths that are tried first */
-#define FINE 0.25f       /* rows by which those differ that are tried in the end */
+#define FINE 0.25f       /* rows by which those differ that are tried in the end, */
+#define FINE_LENGTH 0.75f /* up to so many longer or shorter than the best one, */
+#define FINE_PLACE 0.5f  /* and so many off its middle */
 #define HOPELESS 1e9f    /* the rest of what is no code at all */
 #define MOST_PLACES 96
 
@@ -104,8 +106,8 @@ static int narrow(const float *sum, float segments, float unit, int *low, int n)
     return last - first;
 }
 
-/* The same for many places at once, the rows from ``low`` on; loops that a compiler makes vectors
- * of. The better one of bright and dark is taken for every bit. */
+/* What `compare` does, for many places at once: the rows from ``low`` on, in loops that a compiler
+ * makes vectors of. The better one of bright and dark is taken for every bit. */
 static void sweep(const float *sum, int bits, float unit, int low, int n, eye_slid *best)
 {
     int segments = 2 * bits + 5;
@@ -162,10 +164,11 @@ static void sweep(const float *sum, int bits, float unit, int low, int n, eye_sl
 /* Tries codes about the best one, by fractions of a row. */
 static void refine(const float *sum, int rows, int bits, eye_slid *best)
 {
-    float segments = (float)(2 * bits + 5), apart = 0.75f / segments, unit = best->unit;
+    float segments = (float)(2 * bits + 5), apart = FINE_LENGTH / segments, unit = best->unit;
     float middle = best->top + unit * segments / 2;
+    best->rest = HOPELESS; /* only what has been compared has an id */
     for (float size = unit - apart; size <= unit + apart; size += FINE / segments) {
-        for (float off = -0.5f; off <= 0.5f; off += FINE) {
+        for (float off = -FINE_PLACE; off <= FINE_PLACE; off += FINE) {
             eye_slid one = {.top = middle + off - size * segments / 2, .unit = size};
             compare(sum, rows, bits, &one);
             if (one.rest < best->rest)

@@ -87,7 +87,7 @@ static int match_stretch(eye_hits *hits, const float *sum, int top, int bottom, 
             .bottom = begin + (segments - 4) * best.unit,
             .bits = (int16_t)bits,
             .id = (int16_t)best.id,
-            .contrast = (uint8_t)best.contrast,
+            .contrast = (uint8_t)eye_limit(best.contrast, 0, 255),
         };
         found++;
     }
@@ -134,14 +134,15 @@ void eye_match_comb(eye_hits *hits, const uint8_t *signal, int first, int last, 
     }
 }
 
-/* Codes in column ``x`` that have hardly any colour left, somewhere: by their brightness. */
+/* Codes in column ``x`` that have hardly any colour left, somewhere: by their brightness. That takes
+ * long, so it ends when a picture speckled with colour has used up what a landmark may cost. */
 void eye_match_faint(eye_hits *hits, int x)
 {
     const eye_picture *p = hits->picture;
     const uint8_t *column = p->pixels + (ptrdiff_t)p->channels * x;
     float sum[MOST_SUMS];
     int y = 0;
-    while (y < p->rows) {
+    while (y < p->rows && hits->slides > 0) {
         while (y < p->rows && eye_colour(column + y * p->stride, hits->task) <= EYE_FAINT)
             y += ROWS_APART;
         int from = y, end = y;
@@ -155,7 +156,9 @@ void eye_match_faint(eye_hits *hits, int x)
         int top = from < room ? 0 : from - room;
         int bottom = end + room + 1 < p->rows ? end + room + 1 : p->rows;
         sum_brightness(hits, x, top, bottom, sum);
-        if (has_valleys(sum, bottom - top))
+        if (has_valleys(sum, bottom - top)) {
+            hits->slides -= hits->n_bits;
             match_stretch(hits, sum, top, bottom, from, end, LONGEST, x);
+        }
     }
 }

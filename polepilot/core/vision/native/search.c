@@ -138,6 +138,7 @@ int eye_search(const eye_picture *picture, const eye_task *task, eye_candidate *
         hits->picture = picture;
         hits->task = task;
         hits->n_hits = hits->n_bits = 0;
+        hits->slides = EYE_MOST_SLIDES;
         choose_bits(hits);
         survey(picture, task, extents);
         look_at_all(hits, extents, signal);

@@ -6,6 +6,7 @@
 
 #define EYE_MOST_RUNS 384 /* bright runs in one column */
 #define EYE_MOST_HITS 3000 /* a picture full of stripes has no landmark */
+#define EYE_MOST_SLIDES 1200 /* by faint colour in a picture, of one length each; photographs need 250 */
 #define EYE_MOST_LENGTHS 4 /* different numbers of bits that are looked for */
 #define EYE_LEAST_STEP 12  /* grey levels of signal; less is noise */
 #define EYE_SHORTEST 1.15f /* rows per segment; shorter ones cannot be told apart */
@@ -41,6 +42,7 @@ typedef struct {
     const eye_picture *picture;
     const eye_task *task;
     int n_bits, bits[EYE_MOST_LENGTHS];
+    int slides; /* that are left, of EYE_MOST_SLIDES */
     int n_hits;
     eye_hit hits[EYE_MOST_HITS];
 } eye_hits;

@@ -18,7 +18,7 @@ from polepilot.core.landmark import LandmarkKind
 from polepilot.core.observation import Image
 from polepilot.core.vision.paint import ORANGE, Paint
 
-VERSION = 2
+VERSION = 3
 IDS = 256
 MOST_STRIPS = 24
 _LIBRARY = Path(__file__).with_name("_kernel.so")

@@ -3,8 +3,9 @@
 
 #include <math.h>
 
-/* Solves matrix x = right in place by Cholesky; ``matrix`` (n x n, symmetric, row by row, n at
- * most EYE_MOST_SEGMENTS + 2) is overwritten, ``right`` holds ``rights`` columns side by side. 0 where it is not positive. */
+/* Solves matrix x = right in place by Cholesky; ``matrix`` (n x n, symmetric, row by row, n at most
+ * EYE_MOST_SEGMENTS + 2) is overwritten, ``right`` holds ``rights`` columns side by side. 0 where it
+ * is not positive. */
 int eye_solve(double *matrix, double *right, int n, int rights)
 {
     double scale[EYE_MOST_SEGMENTS + 2]; /* of each row: dividing is slow */

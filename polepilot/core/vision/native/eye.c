@@ -4,7 +4,7 @@
 #include <math.h>
 
 #define LEAST_ROWS 8           /* of a picture; no code has fewer */
-#define ATTEMPTS 2
+#define ATTEMPTS 2             /* the second one with the code that the first has read */
 #define MOST_MISFIT 7.0        /* with one bright bit, */
 #define MISFIT_A_BIT 3.0       /* and more for every further one: the more there is to fit */
 #define USUAL_NOISE 0.035      /* rms rest of the fit of the edges, of bright - dark */
@@ -57,6 +57,7 @@ static double misfit(const eye_strip *strip, double constant)
     return edges * edges + sides * sides + bend * bend + tint * tint + vague * vague;
 }
 
+/* How much of that a code may have: every bright bit more is evidence that it is one. */
 static double most_misfit(const eye_strip *strip)
 {
     int ones = 0;
@@ -182,7 +183,7 @@ static int examine(const eye_picture *picture, const eye_task *task,
     out->sag_sigma = scale.sag_sigma;
     out->column_sigma = side.sigma;
     double off = misfit(out, task->constant), most = most_misfit(out);
-    if (off > most)
+    if (!(off <= most)) /* or no number */
         return EYE_POOR_FIT;
     doubt /= USUAL_DOUBT;
     return off + doubt * doubt > most ? EYE_NO_BAR : EYE_READ;

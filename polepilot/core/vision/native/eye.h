@@ -23,7 +23,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define EYE_VERSION 2
+#define EYE_VERSION 3
 #define EYE_MOST_BITS 8
 #define EYE_MOST_SEGMENTS (2 * EYE_MOST_BITS + 5)
 #define EYE_CODE_SIZE 24 /* bytes of a code as text, '1' for bright, with room for its end */

@@ -22,7 +22,7 @@
 #define ALL_ROWS 4.0    /* rows per segment up to which each is kept, */
 #define ROWS_A_UNIT 5.0 /* and how many are kept if there are many more */
 #define THIN 3.0        /* half of the columns looked at: nothing is blurred into the midst of more */
-#define OUTSIDE 3
+#define OUTSIDE 3       /* columns at either end that say what is beside the strip */
 #define BESIDE 2.0      /* columns from the strip's side to what is beside it */
 
 /* The rows of one run of the code, averaged. */
@@ -205,7 +205,6 @@ static inline float share_of(double offset, double half)
     return (float)(inside < 0 ? 0 : inside > 1 ? 1 : inside);
 }
 
-/* The straightened light by row, between the code's outer ends and a little beyond. */
 /* Light of every channel and brightness in one row just beside the strip, both sides together. */
 static void fill_beside(const eye_picture *p, const eye_task *task, int y, const eye_upright *u,
                         float *beside)
@@ -222,6 +221,7 @@ static void fill_beside(const eye_picture *p, const eye_task *task, int y, const
     }
 }
 
+/* The straightened light by row, between the code's outer ends and a little beyond. */
 static void fill_profile(const eye_picture *p, const eye_task *task, double top, double bottom,
                          double unit, eye_upright *out)
 {

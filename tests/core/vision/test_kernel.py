@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -124,6 +125,23 @@ def test_noise_fills_no_more_than_there_is_room_for() -> None:
     colour[..., 2] = stripes
     for image in (rng.integers(0, 256, (300, 400, 3), np.uint8), colour, stripes.astype(np.uint8)):
         assert len(KERNEL.look(image)) <= MOST_STRIPS
+
+
+def test_a_picture_speckled_with_faint_colour_takes_no_long_time() -> None:
+    """Every short stretch of faint colour may be a far landmark; laying codes along all of these
+    took a second, and takes a hundredth of that."""
+    kinds = {
+        number: LandmarkKind(bits)
+        for bits in (8, 6, 5, 4)  # the lower ids are those of the shorter codes
+        for number in range(1, 2**bits)
+    }
+    rows = np.random.default_rng(5).normal(110, 8, (1200, 1, 1)) * np.ones((1, 1600, 3))
+    rows[np.arange(1200) % 28 < 6] += (-14, 0, 14)
+    image = rows.clip(0, 255).astype(np.uint8)
+    eye = Kernel(kinds, CAMERA.constant)
+    begin = time.thread_time()
+    eye.look(image)
+    assert time.thread_time() - begin < 0.4
 
 
 def test_no_landmark_is_looked_for() -> None:

@@ -25,7 +25,8 @@ _CONTACT = 1e-5
 _SHORTEST = 0.01
 """Steps below this are joined before curvature is looked at: coordinates have four digits, m."""
 _LONGEST = 0.2
-"""A step counts no longer than this: two long legs make a corner, not a wide curve, m."""
+"""A step counts no longer than this: two long legs make a corner, not a wide curve, m.
+At a change of gear half of it, as the robot stands there."""
 _PLAY = 0.02
 """Turns below this come from the digits, rad."""
 _SMALLEST = 0.05
@@ -102,7 +103,9 @@ def ground(site: Document, start: tuple[float, float], clearance: float) -> Grou
     lines = [shapely.LineString(line) for line in site.get("walls", ())]
     free = floor.buffer(-clearance, quad_segs=_ROUND)
     if lines:
-        free = free.difference(shapely.union_all(shapely.buffer(lines, clearance, _ROUND)))
+        free = free.difference(
+            shapely.union_all(shapely.buffer(lines, clearance, quad_segs=_ROUND))
+        )
     pieces = [part for part in shapely.get_parts(free).tolist() if part.area > 1e-7]
     home = min(pieces, key=lambda part: part.distance(shapely.Point(start)))
     reachable = home.buffer(clearance, quad_segs=_ROUND)
@@ -216,8 +219,8 @@ def corners_of(path: Array, gear: NDArray[np.int_], radius: float) -> tuple[int,
     headings = np.arctan2(moves[:, 1] * gear, moves[:, 0] * gear)
     turns = np.abs((np.diff(headings) + math.pi) % math.tau - math.pi)
     changes = np.diff(gear) != 0
-    legs = np.minimum(lengths, _LONGEST)
-    mean = (legs[:-1] + legs[1:]) / 2
+    longest = np.where(changes, _LONGEST / 2, _LONGEST)
+    mean = (np.minimum(lengths[:-1], longest) + np.minimum(lengths[1:], longest)) / 2
     asked = mean / np.maximum(turns - _PLAY, 1e-12)
     sharp = asked < 0.98 * radius
     along = asked[~changes]

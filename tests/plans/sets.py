@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+import numpy as np
 from plans import buildings as b
 from plans import shapes as s
 from plans.shapes import Document
@@ -99,3 +100,35 @@ DEVELOPMENT: Mapping[str, Maker] = {
     "rectangles 6": lambda: b.overlapping(31, 6),
     "rectangles 9": lambda: b.overlapping(32, 9),
 }
+
+
+def by_lot(rng: np.random.Generator) -> Document:
+    """A map of any family, of a size that takes a second, with every number drawn by lot."""
+
+    def between(low: float, high: float) -> float:
+        return round(float(rng.uniform(low, high)), 3)
+
+    seed = int(rng.integers(1 << 30))
+    makers: list[Maker] = [
+        lambda: s.document(s.box(0, 0, between(0.6, 8), between(0.6, 6))),
+        lambda: s.ell(between(0.6, 2), between(2.5, 6), between(2.5, 6)),
+        lambda: s.horseshoe(between(0.6, 1.6), between(2.5, 5), between(0.3, 1.5)),
+        lambda: s.cross(between(0.8, 3), between(0.7, 2.5)),
+        lambda: s.comb(
+            [between(0.45, 1.6) for _ in range(5)], between(1, 3), 0.15, between(0.8, 2)
+        ),
+        lambda: s.snake([between(0.6, 1.8) for _ in range(4)], between(4, 7), 0.1),
+        lambda: s.star(int(rng.integers(4, 12)), between(1.2, 2.2), between(2.5, 4)),
+        lambda: s.necks([between(0.3, 1.2) for _ in range(3)], between(1.5, 3)),
+        lambda: s.zigzag(int(rng.integers(3, 6)), between(0.7, 1.8), between(2.2, 3.5)),
+        lambda: s.wavy(int(rng.integers(20, 400)), between(2, 4), between(0.05, 0.25), seed),
+        lambda: s.pillars((7, 5), int(rng.integers(1, 14)), (0.08, 0.35), seed),
+        lambda: s.maze(4, 3, between(0.8, 1.8), seed),
+        lambda: s.fences((6, 5), int(rng.integers(1, 6)), seed),
+        lambda: b.house(seed, int(rng.integers(2, 6))),
+        lambda: b.office(seed, int(rng.integers(2, 6)), int(rng.integers(0, 9))),
+        lambda: b.flat(seed, int(rng.integers(2, 5)), int(rng.integers(0, 6))),
+        lambda: b.overlapping(seed, int(rng.integers(2, 7))),
+    ]
+    site = makers[int(rng.integers(len(makers)))]()
+    return s.turned(site, between(-3, 3)) if rng.random() < 0.4 else site

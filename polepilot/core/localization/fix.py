@@ -25,6 +25,9 @@ from polepilot.core.observation import RangeBearing
 
 Array = NDArray[np.float64]
 
+_SINGULAR = 1e-13
+"""Smallest against largest information; beyond it an inverse is rounding errors."""
+
 RefusalCode = Literal["none", "one_landmark", "one_direction", "no_intersection", "contradiction"]
 
 
@@ -273,6 +276,8 @@ def _consensus(
             if error <= allowed:
                 agreeing.append(cluster)
                 cost += error / allowed
+        if len(agreeing) < 2:
+            continue
         score = (len(agreeing), sum(len(c.members) for c in agreeing), -cost)
         same = answer is not None and {c.landmark.id for c in agreeing} & {
             c.landmark.id for c in answer[1]
@@ -368,13 +373,27 @@ def _finish(
             "contradiction",
             (culprit,),
         )
-    covariance = np.linalg.inv(information)
-    covariance = 0.5 * (covariance + covariance.T)
+    covariance = covariance_of(information)
+    if covariance is None:
+        return _one_direction(ids)
     largest = math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
     if largest > settings.max_position_sigma or covariance[2, 2] > settings.max_heading_sigma**2:
         return _one_direction(ids)
     solved = Pose2D(float(state[0]), float(state[1]), wrap_angle(float(state[2])))
     return Fix(solved, covariance, ids)
+
+
+def covariance_of(information: Array) -> Array | None:
+    """The inverse of an information matrix; None where that does not tell all of the state.
+
+    Rounding makes of a matrix that is singular but for the last digits one that has an inverse,
+    with variances below zero.
+    """
+    values = np.linalg.eigvalsh(information)
+    if not values[0] > _SINGULAR * values[-1]:
+        return None
+    covariance: Array = np.linalg.inv(information)
+    return 0.5 * (covariance + covariance.T)
 
 
 def _place_sigma(measurement: RangeBearing, settings: FixSettings) -> float:

@@ -20,7 +20,13 @@ from numpy.typing import NDArray
 
 from polepilot.core.geometry import Point, Pose2D, wrap_angle
 from polepilot.core.landmark import Landmark
-from polepilot.core.localization.fix import DEFAULT_FIX, FixRefusal, FixSettings, fix
+from polepilot.core.localization.fix import (
+    DEFAULT_FIX,
+    FixRefusal,
+    FixSettings,
+    covariance_of,
+    fix,
+)
 from polepilot.core.observation import RangeBearing
 
 Array = NDArray[np.float64]
@@ -172,12 +178,10 @@ def _by_bearings(
         state = state + step
         if float(np.abs(step).max()) < 1e-9:
             break
-    try:
-        covariance = np.linalg.inv(information)
-    except np.linalg.LinAlgError:
+    covariance = covariance_of(information)
+    if covariance is None:
         return _no_tell(agreeing)
-    covariance = 0.5 * (covariance + covariance.T)
-    largest = math.sqrt(max(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]), 0.0))
+    largest = math.sqrt(float(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
     if not largest <= settings.max_position_sigma:
         return _no_tell(agreeing)
     x, y, zero = state.tolist()

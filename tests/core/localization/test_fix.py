@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from polepilot.core.localization.fix import (
     Fix,
     FixRefusal,
     circle_intersections,
+    covariance_of,
     fix,
     two_landmark_fix,
 )
@@ -237,3 +239,40 @@ def test_landmarks_in_one_direction_are_refused() -> None:
     pose = Pose2D(1.0, 2.0, 0.0)
     answer = refusal(fix([see(pose, 1, marks), see(pose, 2, marks)], marks, FORWARD))
     assert answer.code == "one_direction"
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(list(MARKS)),
+            st.floats(0.3, 10.0),
+            st.floats(-3.1, 3.1),
+            st.floats(1e-4, 1.0),
+            st.floats(1e-5, 0.3),
+            st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(-1, 1)),
+        ),
+        max_size=8,
+    )
+)
+@settings(deadline=None, max_examples=200)
+def test_whatever_was_measured_gives_a_fix_of_two_or_a_reason(rows: list[Any]) -> None:
+    measured = [RangeBearing(0.0, *row[:5]) for row in rows]
+    answer = fix(measured, MARKS, FORWARD, mounts=[Pose2D(*row[5]) for row in rows])
+    if isinstance(answer, Fix):
+        assert len(answer.landmarks) >= 2
+        assert np.linalg.eigvalsh(answer.covariance)[0] > 0
+    else:
+        assert answer.reason.endswith(".")
+
+
+def test_sightings_of_one_landmark_do_not_make_a_covariance() -> None:
+    """From a robot that turned between two sightings of one landmark; met in a bad recording."""
+    rows = [(3.1637, 0.8227), (3.1431, 0.8033)]
+    information = np.zeros((3, 3))
+    for distance, bearing in rows:
+        row = np.array((math.cos(bearing), math.sin(bearing), distance))
+        information += np.outer(row, row) / 0.015**2
+    assert covariance_of(information) is None
+    whole = covariance_of(np.diag((4.0, 1.0, 0.25)))
+    assert whole is not None
+    assert np.allclose(whole, np.diag((0.25, 1.0, 4.0)))

@@ -97,8 +97,12 @@ def replay(
         # A picture may be lost; with all of them lost it is no recording.
         raise DatasetError(f"{dataset}: none of its pictures can be used; {unusable[0]}")
     write_results(result, out, smoothed_poses(recording, result) if smooth else None)
+    notes = [*recording.notes]
+    if result.refusal:
+        notes.append(f"No pose was found: {result.refusal}")
+        sys.stderr.write(notes[-1] + "\n")
     if json:
-        typer.echo(json_module.dumps({**result.to_json(), "notes": recording.notes}))
+        typer.echo(json_module.dumps({**result.to_json(), "notes": notes}))
         return
     typer.echo(f"{len(result.estimates)} poses from {result.frames} pictures -> {out}")
     for event in result.events:

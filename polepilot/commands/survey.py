@@ -163,8 +163,6 @@ def to_run(data: Dataset, kinds: Kinds, progress: Callable[[float], None]) -> Su
     from polepilot.core.vision.measure import to_range_bearing
 
     pan = _PanAt([s for s in data.samples if isinstance(s, PanReading)])
-    if not pan and any(isinstance(s, FrameFile) for s in data.samples):
-        raise DatasetError(f"{data.folder}: holds no pan readings: expected samples of kind 'pan'.")
     detector = LandmarkDetector(data.camera, kinds, data.paint)
     pictures = []
     problem, unusable = "", 0
@@ -253,9 +251,6 @@ class _PanAt:
 
         self._stamps = np.array([reading.stamp for reading in readings])
         self._angles = np.array([reading.angle for reading in readings])
-
-    def __bool__(self) -> bool:
-        return len(self._stamps) > 0
 
     def __call__(self, stamp: float) -> tuple[float, float] | None:
         """Angle and its standard deviation, radians; None where no reading is near."""

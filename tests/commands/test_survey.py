@@ -215,8 +215,12 @@ def test_pictures_without_a_drive(
     kept = [line for line in lines if line["kind"] != "drive"]
     (tmp_path / "samples.jsonl").write_text("".join(json.dumps(line) + "\n" for line in kept))
     assert run(["survey", str(tmp_path)]) == 2
+    assert "expected at least one sample of kind 'drive'" in capsys.readouterr().err
+    kept = [line | ({"speed": 0.0} if line["kind"] == "drive" else {}) for line in lines]
+    (tmp_path / "samples.jsonl").write_text("".join(json.dumps(line) + "\n" for line in kept))
+    assert run(["survey", str(tmp_path)]) == 2
     assert "the robot drove 0.00 m" in capsys.readouterr().err
     kept = [line for line in lines if line["kind"] != "pan"]
     (tmp_path / "samples.jsonl").write_text("".join(json.dumps(line) + "\n" for line in kept))
     assert run(["survey", str(tmp_path)]) == 2
-    assert "no pan readings" in capsys.readouterr().err
+    assert "expected at least one sample of kind 'pan'" in capsys.readouterr().err

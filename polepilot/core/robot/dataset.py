@@ -41,6 +41,8 @@ Sample = Odometry | PanReading | FrameFile | Sighted
 
 _FASTEST = 100.0
 """No robot on poles drives faster, m/s."""
+_SMALLEST_ROBOT, _LARGEST_ROBOT = 0.001, 100.0
+"""Of its lengths, metres."""
 _APART = 0.001
 """Nearer to each other than this no two landmarks can stand, metres."""
 _BEYOND = math.radians(20)
@@ -88,8 +90,8 @@ def read_dataset(folder: Path) -> Dataset:
         raise DatasetError(f"{folder}: expected a folder with dataset.json and samples.jsonl.")
     path = folder / "dataset.json"
     root = Fields(path, "", parse_json(_read_text(path), path))
-    camera, pan = root.child("camera"), root.child("camera")
-    minimum, maximum = pan.number("pan_min_rad"), pan.number("pan_max_rad")
+    camera, vehicle = root.child("camera"), root.child("vehicle")
+    minimum, maximum = camera.number("pan_min_rad"), camera.number("pan_max_rad")
     if not minimum < maximum:
         raise DatasetError(f"{path}: camera.pan_min_rad must be less than pan_max_rad.")
     truth = folder / "truth.tum"
@@ -101,12 +103,12 @@ def read_dataset(folder: Path) -> Dataset:
             height=camera.count("height"),
             center_x=camera.number("cx"),
             center_y=camera.number("cy"),
-            forward=camera.number("forward_m"),
+            forward=camera.number("forward_m", within=(-_LARGEST_ROBOT, _LARGEST_ROBOT)),
             mount_height=camera.number("height_m", above=0),
         ),
         vehicle=Vehicle(
-            wheelbase=root.child("vehicle").number("wheelbase_m", above=0),
-            track=root.child("vehicle").number("track_m", above=0),
+            wheelbase=vehicle.number("wheelbase_m", within=(_SMALLEST_ROBOT, _LARGEST_ROBOT)),
+            track=vehicle.number("track_m", within=(_SMALLEST_ROBOT, _LARGEST_ROBOT)),
         ),
         pan_minimum=minimum,
         pan_maximum=maximum,
@@ -177,8 +179,11 @@ def _samples(folder: Path, pan: tuple[float, float]) -> tuple[Sample, ...]:
             samples.append(FrameFile(stamp, picture, number))
         else:
             raise DatasetError(f"{where}: kind is {kind!r}: expected 'drive', 'pan' or 'frame'.")
-    if not any(isinstance(sample, FrameFile) for sample in samples):
-        raise DatasetError(f"{path}: expected at least one sample of kind 'frame'.")
+    # Without commands or pan angles a pose would be guesswork: a robot that does not say how it
+    # drives would be taken to stand.
+    for wanted, name in ((FrameFile, "frame"), (Odometry, "drive"), (PanReading, "pan")):
+        if not any(isinstance(sample, wanted) for sample in samples):
+            raise DatasetError(f"{path}: expected at least one sample of kind {name!r}.")
     return in_order(samples)
 
 

@@ -59,6 +59,8 @@ class ReplayResult:
     """Landmarks that do not stand where the map has them."""
     lags: tuple[float, float] = (0.0, 0.0)
     """Time constants of motors and servo, as far as they were learnt, seconds."""
+    refusal: str = ""
+    """Why there is no pose at all, for a person; empty where there is one."""
 
     def to_json(self) -> dict[str, Any]:
         """The ``replay --json`` document."""
@@ -187,6 +189,8 @@ def replay(
             progress(result.frames)
     result.moved = frozenset(localizer.moved_landmarks)
     result.lags = (localizer.history.speed_lag, localizer.history.steering_lag)
+    if not result.estimates:
+        result.refusal = localizer.reason
     return result
 
 

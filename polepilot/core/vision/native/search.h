@@ -6,7 +6,7 @@
 
 #define EYE_MOST_RUNS 384 /* bright runs in one column */
 #define EYE_MOST_HITS 3000 /* a picture full of stripes has no landmark */
-#define EYE_MOST_SLIDES 1200 /* by faint colour in a picture, of one length each; photographs need 250 */
+#define EYE_MOST_SLIDES 2400 /* by faint colour, of one length each; 1600x1200 may need 2000 */
 #define EYE_MOST_LENGTHS 4 /* different numbers of bits that are looked for */
 #define EYE_LEAST_STEP 12  /* grey levels of signal; less is noise */
 #define EYE_SHORTEST 1.15f /* rows per segment; shorter ones cannot be told apart */

@@ -29,7 +29,11 @@ def serve(
         ),
     ] = None,
     board: Annotated[
-        str | None, typer.Option(help="simulated, host or serial.", show_default="as configured")
+        str | None,
+        typer.Option(
+            help="simulated, host (simulated, with the firmware's C code) or serial.",
+            show_default="as configured",
+        ),
     ] = None,
 ) -> None:
     """Serve the page and drive the robot until Ctrl-C."""
@@ -38,23 +42,14 @@ def serve(
     from polepilot.server.settings import load_settings
 
     check_loopback(host)
-    settings = _with_board(load_settings(config), board)
+    settings = load_settings(config)
+    if board is not None:
+        settings = settings.with_board(board)
     listening = bind(host, settings.server.port if port is None else port)
     try:
         _run(settings, host, listening.getsockname()[1], [listening], data)
     finally:
         listening.close()
-
-
-def _with_board(settings: Settings, board: str | None) -> Settings:
-    from polepilot.core.errors import InputError
-
-    if board == "host":
-        raise InputError(
-            "--board host is not available in this version, it comes with the firmware:"
-            " expected simulated or serial."
-        )
-    return settings if board is None else settings.with_board(board)
 
 
 def _run(settings: Settings, host: str, port: int, sockets: list, data: Path | None) -> None:  # type: ignore[type-arg]

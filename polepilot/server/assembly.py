@@ -16,6 +16,8 @@ from polepilot.core.link.usb import SerialPort
 from polepilot.core.robot.eye import Eye
 from polepilot.core.robot.ports import CameraPort, Clock
 from polepilot.core.robot.robot import Robot
+from polepilot.core.sim.board import BoardSettings
+from polepilot.core.sim.board_process import BoardProcess
 from polepilot.core.sim.clock import PacedClock
 from polepilot.core.sim.obstacle import Obstacle
 from polepilot.core.sim.render import Look
@@ -26,6 +28,7 @@ from polepilot.core.vision.detector import LandmarkDetector
 from polepilot.core.vision.paper import PaperDetector
 from polepilot.server.clock import MonotonicClock
 from polepilot.server.eyes import BackgroundSensor
+from polepilot.server.firmware import host_program
 from polepilot.server.missions import last_site
 from polepilot.server.panel import Panel
 from polepilot.server.runner import RobotPort, Twin
@@ -76,7 +79,7 @@ class WorldTwin:
 
 def assemble(settings: Settings, site: Site) -> Assembly:
     """Build what ``settings`` describe. ``site`` is where a simulated robot stands at first."""
-    if settings.link.board == "simulated":
+    if settings.link.board != "serial":
         return _simulated(settings, site)
     clock = MonotonicClock()
     address = settings.port_address
@@ -97,10 +100,14 @@ def assemble(settings: Settings, site: Site) -> Assembly:
 
 def _simulated(settings: Settings, site: Site) -> Assembly:
     seed = settings.simulation.seed
+    board = None
+    if settings.link.board == "host":
+        board = BoardProcess.host(host_program(), BoardSettings.from_model(settings.model))
     world = World(
         site,
         settings.model,
         seed=seed,
+        board=board,
         disturbances=settings.disturbances(np.random.default_rng(seed)),
         look=Look.painted(settings.paint),
     )

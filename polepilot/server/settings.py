@@ -65,9 +65,11 @@ class Settings(Section):
             raise refusal(
                 "camera.source", "simulated", 'a real camera, because link.board is "serial"'
             )
-        if self.camera.source != "simulated" and self.link.board == "simulated":
+        if self.camera.source != "simulated" and self.link.board != "serial":
             raise refusal(
-                "camera.source", self.camera.source, '"simulated", as long as link.board is that'
+                "camera.source",
+                self.camera.source,
+                f'"simulated", as long as link.board is "{self.link.board}"',
             )
         return self
 
@@ -201,13 +203,14 @@ class Settings(Section):
     def with_board(self, board: str) -> Settings:
         """These settings for another board, as ``serve --board`` asks for.
 
-        The simulated board comes with the simulated camera: there is no half-simulated world.
+        A board in the simulated world comes with the simulated camera: there is no half-simulated
+        world.
 
         Raises:
             ConfigError: the board is unknown, or "serial" without a port or a real camera.
         """
         changes: dict[str, dict[str, Any]] = {"link": {"board": board}}
-        if board == "simulated":
+        if board in ("simulated", "host"):
             changes["camera"] = {"source": "simulated"}
         return self.override(changes, "--board")
 

@@ -278,8 +278,10 @@ class LandmarkSettings(Section):
 class LinkSettings(Section):
     """The line to the microcontroller."""
 
-    board: Literal["simulated", "serial"] = Field(
-        default="simulated", description='"simulated", or "serial" for a board on USB'
+    board: Literal["simulated", "host", "serial"] = Field(
+        default="simulated",
+        description='"simulated", "serial" for a board on USB, or "host": simulated, but with the '
+        "firmware's C code as its microcontroller",
     )
     port: str = Field(
         default="",

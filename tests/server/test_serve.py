@@ -170,7 +170,6 @@ def test_a_data_folder_in_use(start: Start, tmp_path: Path) -> None:
         (["--host", "0.0.0.0"], "expected 127.0.0.1"),
         (["--host", "192.168.0.7"], "expected 127.0.0.1"),
         (["--port", "70000"], "65535"),
-        (["--board", "host"], "firmware"),
         (["--board", "toaster"], "toaster"),
         (["--board", "serial"], "port"),
         (["--config", "/nowhere/robot.toml"], "/nowhere/robot.toml"),

@@ -141,7 +141,7 @@ def test_values_reach_the_core() -> None:
         ("[localizer]\nlost_after_s = 1", "localizer.lost_after_s is 1.0: expected at least degr"),
         ("[proximity]\nangles_rad = [-1, 0, 1]", "angles_rad is [-1.0, 0.0, 1.0]: expected left, "),
         ("[proximity]\nhard_limit_m = 2", "proximity.hard_limit_m is 2.0: expected less than max_"),
-        ('[link]\nboard = "usb"', 'link.board is "usb": expected one of "simulated", "serial"'),
+        ('[link]\nboard = "usb"', 'link.board is "usb": expected one of "simulated", "host"'),
         ('[link]\nboard = "serial"', 'link.port is "": expected a serial port, because link.boa'),
         ('[link]\nport = "COM3"', 'link.port is "COM3": expected a path such as "/dev/polepilot"'),
         (
@@ -215,6 +215,8 @@ def test_another_board() -> None:
     simulated = hardware.with_board("simulated")
     assert simulated.camera.source == "simulated"
     assert simulated.link.port == "/dev/polepilot"
+    hosted = hardware.with_board("host")
+    assert (hosted.link.board, hosted.camera.source) == ("host", "simulated")
     assert hardware.with_board("serial") == hardware
     with pytest.raises(ConfigError, match=r"^--board: link.port is"):
         Settings().with_board("serial")

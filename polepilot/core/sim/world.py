@@ -20,6 +20,7 @@ from polepilot.core.observation import Frame
 from polepilot.core.robot.ports import Chunk, Sighting
 from polepilot.core.scenery import Disc, Scenery
 from polepilot.core.sim.board import Board, BoardInputs, BoardSettings
+from polepilot.core.sim.board_process import BoardProcess
 from polepilot.core.sim.motion import Actuation, Disturbances, Motion
 from polepilot.core.sim.obstacle import Obstacle
 from polepilot.core.sim.proximity import sense
@@ -61,7 +62,8 @@ class World:
         site: where walls, islands and landmarks truly stand.
         disturbances: None draws one robot of a series from the seed.
         start: true pose of `base_link`; None stands at the site's start, or inside its floor.
-        board: settings of the microcontroller; None fits them to the model, without encoders.
+        board: settings of the microcontroller; None fits them to the model, without encoders. Or a
+            microcontroller that is a program of its own, which is ended with the link.
         full_speed: of a rear wheel under full duty, m/s.
         look: light and paint in the camera's pictures.
     """
@@ -74,7 +76,7 @@ class World:
         seed: int = 0,
         disturbances: Disturbances | None = None,
         start: Pose2D | None = None,
-        board: BoardSettings | None = None,
+        board: BoardProcess | BoardSettings | None = None,
         full_speed: float = 0.5,
         look: Look | None = None,
     ) -> None:
@@ -92,7 +94,11 @@ class World:
             full_speed=full_speed,
             pose=start or start_of(site),
         )
-        self._board = Board(board or BoardSettings.from_model(self.model))
+        self._board: Board | BoardProcess = (
+            board
+            if isinstance(board, BoardProcess)
+            else Board(board or BoardSettings.from_model(self.model))
+        )
         self._inputs = BoardInputs()
         self._actuation = Actuation()
         self._ticks = 0
@@ -300,7 +306,11 @@ class WorldLink:
             self._world._board.receive(data, self._world.now)
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """A board that is a program of its own ends; the simulated one has nothing to give back."""
+        board = self._world._board
+        if isinstance(board, BoardProcess):
+            with self._world._lock:
+                board.close()
 
     def deliver(self, data: bytes) -> None:
         if self._plugged and data:

@@ -392,8 +392,8 @@ def covariance_of(information: Array) -> Array | None:
     values = np.linalg.eigvalsh(information)
     if not values[0] > _SINGULAR * values[-1]:
         return None
-    covariance: Array = np.linalg.inv(information)
-    return 0.5 * (covariance + covariance.T)
+    inverse = np.linalg.inv(information)
+    return np.asarray(0.5 * (inverse + inverse.T), dtype=np.float64)
 
 
 def _place_sigma(measurement: RangeBearing, settings: FixSettings) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 from polepilot.core.errors import DatasetError, InputError
 from polepilot.core.geometry import Point, Pose2D
@@ -14,6 +14,9 @@ from polepilot.core.observation import Odometry, RangeBearing
 
 Picture = tuple[float, tuple[RangeBearing, ...]]
 """Stamp and what was seen, possibly nothing."""
+
+_APART = 0.05
+"""Nearer to each other than this no two poles stand, metres: they are thicker."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,6 +107,11 @@ class SurveyOptions:
                 raise InputError(f"{name.replace('_', '-')} is {value:g}: expected more than 0.")
         if len(self.anchors) == 1:
             raise InputError("one anchor is given: expected two or more, or none.")
+        for (one, here), (other, there) in combinations(self.anchors.items(), 2):
+            if not math.dist(here, there) > _APART:
+                raise InputError(
+                    f"anchors {one} and {other} are in one place: expected places of their own."
+                )
         if self.anchors and self.hand_measured:
             raise InputError("anchors and a map to refine exclude each other: expected one.")
         if self.distance is not None:

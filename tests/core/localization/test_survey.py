@@ -143,6 +143,11 @@ def test_poles_that_are_not_on_the_map_are_added() -> None:
     assert [(gone.id, gone.reason) for gone in found.not_placed] == [(15, "was not seen")]
 
 
+def test_anchors_in_one_place_are_refused() -> None:
+    with pytest.raises(InputError, match="anchors 1 and 3 are in one place"):
+        SurveyOptions(anchors={1: (0.0, 0.0), 2: (4.0, 0.0), 3: (0.01, 0.0)})
+
+
 def test_another_map_is_refused() -> None:
     one = shared("room", SEEDS[0])
     rng = np.random.default_rng(3)

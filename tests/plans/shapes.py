@@ -313,6 +313,21 @@ def fences(size: tuple[float, float], count: int, seed: int) -> Document:
     return document(box(0, 0, *size), walls=walls)
 
 
+def figure_13() -> Document:
+    """A site after Fig. 13 of the paper: a gate that is wide enough joins A and B; those to C, and
+    from there to D, are too narrow."""
+    walls = [
+        [[2.6, 0.0], [2.6, 0.6]],
+        [[2.6, 1.2], [2.6, 1.9]],
+        [[2.6, 1.9], [2.6, 2.7]],
+        [[2.6, 3.0], [2.6, 3.8]],
+        [[0.0, 1.9], [3.6, 1.9]],
+        [[3.95, 1.9], [5.4, 1.9]],
+    ]
+    start = [0.25, 0.9]
+    return document(box(0, 0, 5.4, 3.8), walls=walls, start=start)
+
+
 def _rounded_box(width: float, height: float) -> Ring:
     return box(0.0, 0.0, round(width, 5), round(height, 5))
 

@@ -17,6 +17,7 @@ from polepilot.core.geometry import Pose2D, wrap_angle
 from polepilot.core.plan import PartKind, Plan, PlanPart
 from polepilot.core.planning.bumps import short_bumps, with_bumps
 from polepilot.core.planning.driver import Driver
+from polepilot.core.planning.groups import regions_of
 from polepilot.core.planning.offset import (
     OVERLAP,
     Points,
@@ -155,6 +156,8 @@ def _strokes(
     if not whole:
         loops = _patch_strokes(pieces, target, tool, tolerance)
         return _completed(loops, space, target, tool, smallest)
+    if options.order == "paper":
+        pieces = [region for piece in pieces for region in regions_of(piece, tool)]
     best: list[Stroke] = []
     least = math.inf
     plain = options.min_turn_radius <= 0

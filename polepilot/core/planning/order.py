@@ -167,7 +167,10 @@ def _visit(
     last = _last(children, here, space, 3 * way.reach) if entry.final or not way.gap else None
     if order == "paper":
         yield Run(_stretch(line, entry.first, entry.first + length), stroke, whole=True)
-        for child in sorted(node.children, key=lambda c: (c is last, -c.weight)):
+        # What lies inside of this loop belongs to its group, which is finished first.
+        ring = shapely.Polygon(stroke.points)
+        mine = {id(c) for c in node.children if shapely.covers(ring, c.stroke.line)}
+        for child in sorted(node.children, key=lambda c: (id(c) not in mine, c is last, -c.weight)):
             yield child, _Entry.at(child, place, final=False)
         return
     span = entry.span

@@ -18,7 +18,7 @@ def clearance_of(plan: Plan, site: Site) -> float:
     room = Polygon(site.boundary)
     if not room.buffer(1e-6).covers(path):
         return -1.0
-    if any(Polygon(ring).intersects(path) for ring in site.islands):
+    if any(Polygon(ring).intersects(path) for ring in (*site.islands, *site.no_go)):
         return -1.0
     return float(path.distance(site.obstacles()))
 

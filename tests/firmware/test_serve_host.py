@@ -35,8 +35,7 @@ def test_a_mission_is_driven_through_the_c_core(tmp_path: Path) -> None:
     config = tmp_path / "robot.toml"
     config.write_text(CONFIG)
     service = subprocess.Popen(
-        [*COMMAND, "--port", "0", "--data", str(tmp_path), "--config", str(config)]
-        + ["--board", "host"],
+        [*COMMAND, "--port=0", f"--data={tmp_path}", f"--config={config}", "--board=host"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -265,6 +265,24 @@ def test_whatever_was_measured_gives_a_fix_of_two_or_a_reason(rows: list[Any]) -
         assert answer.reason.endswith(".")
 
 
+def test_landmarks_that_one_pose_cannot_have_both() -> None:
+    """As far apart as the map says, but for an error that no single pose takes up: a robot that
+    was pushed. The sightings of one of them do not make a pose."""
+    marks = {2: Landmark(2, 3.7898, 0.1883), 8: Landmark(8, 0.1776, 1.2731)}
+    rows = [
+        ((2, 4.2719, 1.1540, 0.14322, 0.09012), (-0.7200, 0.8809, -1.9078)),
+        ((8, 2.9443, -0.3361, 0.07061, 0.06102), (-0.6288, 0.3489, -1.2154)),
+        ((8, 2.6758, -1.6817, 0.00552, 0.00853), (0.0319, -0.0126, -0.1492)),
+        ((8, 2.6840, -1.7294, 0.00432, 0.00679), (0.0585, -0.0109, -0.1121)),
+        ((8, 2.6969, -1.7743, 0.00332, 0.00504), (0.0846, -0.0083, -0.0752)),
+        ((8, 2.7019, -1.8210, 0.00261, 0.00327), (0.1102, -0.0048, -0.0388)),
+        ((8, 2.7189, -1.8619, 0.00235, 0.00144), (0.137, 0.0, 0.0)),
+    ]
+    measured = [RangeBearing(0.0, *row) for row, _ in rows]
+    mounts = [Pose2D(*mount) for _, mount in rows]
+    assert refusal(fix(measured, marks, 0.137, mounts=mounts)).code == "contradiction"
+
+
 def test_sightings_of_one_landmark_do_not_make_a_covariance() -> None:
     """From a robot that turned between two sightings of one landmark; met in a bad recording."""
     rows = [(3.1637, 0.8227), (3.1431, 0.8033)]

@@ -22,7 +22,7 @@ from polepilot.core.site import Site
 _INK, _COVERED, _BLOCKED, _MARK, _TARGET = "#1B1F23", "#56B4E9", "#D55E00", "#E69F00", "#009E73"
 _WIDTH = 1000.0
 _ARROWS_EVERY = 2.0
-_MOST_LABELS = 40
+_MOST_LABELS = 12
 """With more bridges and links than this their letters would hide the drawing."""
 _MOST_LOOPS = 4
 _LARGEST_LETTER = 46.0

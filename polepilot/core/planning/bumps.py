@@ -25,6 +25,12 @@ _SLIVER = 0.002
 """What is thinner than twice this is left, metres."""
 _LOSS = 0.0003
 """So much may be swept no more where a bump cuts across, m² for a tool of 0.4 m."""
+_TIP = 0.03
+"""Of a patch so much, as a share of the tool's radius, may be left along its outline."""
+_PITCH = 1.7
+"""A path beside a strip steps aside for half of this, as a share of the tool's radius."""
+_RISE = 0.9
+"""From how far away such steps sweep the whole strip, as a share of the tool's radius."""
 _ROUND = 12
 """Segments per quarter turn of a capsule."""
 _MOST_CUTS = 7
@@ -36,9 +42,7 @@ def short_bumps(patch: Polygon, tool: float) -> bool:
     radius = tool / 2
     length = float(patch.length) / 2
     width = float(patch.area) / max(length, 1e-9)
-    pitch = np.linspace(0.4, 1.9, 16) * radius
-    depth = width + radius - np.sqrt(radius**2 - pitch**2 / 4)
-    bumps = float(np.min(np.ceil(length / pitch) * 2 * depth))
+    bumps = length / (_PITCH * radius) * 2 * (width + (1 - _RISE) * radius)
     return bumps < 2 * max(length - radius, 0.0) + 2 * (radius + width / 2)
 
 
@@ -81,7 +85,7 @@ class _Bumped:
         self._tree = shapely.STRtree(self._lines)
         self._kept_marks = np.zeros(0)
         self._bumps: list[tuple[float, float, Points, LineString]] = []
-        """From and to which length along the path, the place between, and the line by way of it."""
+        """From and to which length along the path, the places between, the line through them."""
 
     def keep(self, indices: list[int]) -> None:
         """Bumps may not cut across these points of the path."""
@@ -94,12 +98,54 @@ class _Bumped:
         if place is not None:
             self._add(place)
         elif cuts:
-            for piece in _pieces(patch, self._radius):
-                self.reach(piece, cuts - 1)
+            strip = _strip(patch, _PITCH * self._radius)
+            for piece in strip or _pieces(patch, self._radius):
+                if not (strip and self._step_aside(piece)):
+                    self.reach(piece, cuts - 1)
+
+    def _step_aside(self, piece: Polygon) -> bool:
+        """Leads a stretch of a straight leg nearer to a piece of a strip beside it."""
+        radius = self._radius
+        near = self._tree.query(piece, predicate="dwithin", distance=1.5 * radius)
+        middle = shapely.centroid(piece)
+        lengths = np.round(shapely.distance(self._lines[near], middle), 5)
+        for index in near[np.lexsort((near, lengths))][:4].tolist():
+            a, b = self._path[index], self._path[index + 1]
+            length = float(self._marks[index + 1] - self._marks[index])
+            if length < _PITCH * radius / 2:
+                continue
+            along = (b - a) / length
+            beside = np.array([-along[1], along[0]])
+            corners = shapely.get_coordinates(piece) - a
+            across = corners @ beside
+            if across.mean() < 0:
+                beside, across = -beside, -across
+            depth = float(across.max()) - radius * _RISE
+            at = float(np.ptp(corners @ along) / 2 + (corners @ along).min())
+            half = _PITCH * radius / 4
+            if not half <= at <= length - half or depth <= 0:
+                continue
+            first = float(self._marks[index]) + at - half
+            last = first + 2 * half
+            if self._taken(first, last):
+                continue
+            tips = np.vstack([a + along * (at - half), a + along * (at + half)]) + depth * beside
+            left = piece.difference(_swept([tips], radius)).area
+            if left < _LOSS * (radius / 0.2) ** 2 and self._try(first, last, tips, 4.0):
+                return True
+        return False
+
+    def _taken(self, first: float, last: float) -> bool:
+        """Whether a stretch of the path holds another bump, or a point that stays."""
+        return any(first < bump[1] and bump[0] < last for bump in self._bumps) or bool(
+            ((self._kept_marks > first) & (self._kept_marks < last)).any()
+        )
 
     def _place(self, patch: Polygon) -> shapely.Geometry | None:
         """Where the tool's middle may be to sweep all of a patch; None: nowhere."""
-        hull = shapely.get_coordinates(shapely.convex_hull(patch).simplify(0.001))[:-1]
+        core = patch.buffer(-_TIP * self._radius, quad_segs=2)
+        hull = shapely.convex_hull(patch if core.is_empty else core).simplify(0.001)
+        hull = shapely.get_coordinates(hull)[:-1]
         discs = shapely.buffer(shapely.points(hull), self._radius - 0.0005, quad_segs=_ROUND)
         place = shapely.intersection_all(discs)
         if not self._space.holds(place):
@@ -129,32 +175,32 @@ class _Bumped:
             first, last = at - reach * self._radius, at + reach * self._radius
             if first < 0 or last > self._marks[-1]:
                 continue
-            if any(first < bump[1] and bump[0] < last for bump in self._bumps):
+            if self._taken(first, last):
                 continue
-            if ((self._kept_marks > first) & (self._kept_marks < last)).any():
-                continue
-            if self._try(first, last, tip):
+            if self._try(first, last, tip[None]):
                 return
 
-    def _try(self, first: float, last: float, tip: Points) -> bool:
-        """Puts a bump in if nothing that counts is lost by it."""
+    def _try(self, first: float, last: float, tips: Points, losses: float = 1.0) -> bool:
+        """Puts a bump by way of ``tips`` in if nothing that counts is lost by it."""
         old = self._stretch(first, last)
-        new = np.vstack([old[0], tip, old[-1]])
+        new = np.vstack([old[0], tips, old[-1]])
         if not self._space.holds_points(new):
             return False
         if last - first > 1e-9:
             before = _swept([old], self._radius)
             window = before.buffer(self._radius)
             others: list[Points] = [new]
-            mine = [bump for bump in self._bumps if math.dist(bump[2], tip) < 8 * self._radius]
+            mine = [
+                bump for bump in self._bumps if math.dist(bump[2][0], tips[0]) < 8 * self._radius
+            ]
             gone = [(first, last), *((bump[0], bump[1]) for bump in mine)]
             for index in self._tree.query(window, predicate="intersects").tolist():
                 others += self._kept(index, gone)
             others += [shapely.get_coordinates(bump[3]) for bump in mine]
             lost = before.difference(_swept(others, self._radius)).intersection(self._target)
-            if lost.area > _LOSS * (self._radius / 0.2) ** 2:
+            if lost.area > losses * _LOSS * (self._radius / 0.2) ** 2:
                 return False
-        self._bumps.append((first, last, tip, LineString(new)))
+        self._bumps.append((first, last, tips, LineString(new)))
         return True
 
     def _kept(self, index: int, gone: list[tuple[float, float]]) -> list[Points]:
@@ -188,12 +234,12 @@ class _Bumped:
         points: list[Points] = []
         marks: list[float] = []
         at = 0
-        for first, last, tip, _ in sorted(self._bumps, key=lambda bump: (bump[0], bump[1])):
+        for first, last, tips, _ in sorted(self._bumps, key=lambda bump: (bump[0], bump[1])):
             stop = int(np.searchsorted(self._marks, first - 1e-9))
             points += list(self._path[at:stop])
             marks += self._marks[at:stop].tolist()
-            points += [self._at(first), tip, self._at(last)]
-            marks += [first, (first + last) / 2, last]
+            points += [self._at(first), *tips, self._at(last)]
+            marks += [first, *[(first + last) / 2] * len(tips), last]
             at = max(at, int(np.searchsorted(self._marks, last + 1e-9)))
         points += list(self._path[at:])
         marks += self._marks[at:].tolist()
@@ -213,24 +259,51 @@ def _swept(lines: Iterable[Points], radius: float) -> shapely.Geometry:
     return shapely.union_all(capsules)
 
 
-def _pieces(patch: Polygon, radius: float) -> list[Polygon]:
-    """A patch cut across its longest direction, so that bumps to its pieces are short."""
+def _box(patch: Polygon) -> tuple[Points, Points, Points] | None:
+    """A corner, the long side and the short side of the smallest box around a patch."""
     box = shapely.minimum_rotated_rectangle(patch)
     if not isinstance(box, Polygon):
-        return []
-    corners = np.asarray(box.exterior.coords, dtype=float)
+        return None
+    corners = shapely.get_coordinates(box)
     if np.hypot(*(corners[1] - corners[0])) < np.hypot(*(corners[2] - corners[1])):
         corners = np.vstack([corners[1:], corners[1:2]])
-    along, across = corners[1] - corners[0], corners[2] - corners[1]
-    length, width = float(np.hypot(*along)), float(np.hypot(*across))
+    return corners[0], corners[1] - corners[0], corners[2] - corners[1]
+
+
+def _sliced(patch: Polygon, count: int) -> list[Polygon]:
+    """A patch cut across its long side into pieces of equal length."""
+    box = _box(patch)
+    if box is None:
+        return []
+    corner, along, across = box
+    found: list[Polygon] = []
+    for step in range(count):
+        first, last = (corner + along * share / count for share in (step, step + 1))
+        strip = Polygon([first, last, last + across, first + across])
+        found += [part for part in polygons(patch.intersection(strip)) if part.area > 1e-5]
+    return found
+
+
+def _strip(patch: Polygon, pitch: float) -> list[Polygon]:
+    """A straight strip in pieces of about ``pitch``; empty: it is none."""
+    box = _box(patch)
+    if box is None:
+        return []
+    length, width = (float(np.hypot(*side)) for side in box[1:])
+    if length < 1.2 * pitch or width > pitch or patch.area < 0.6 * length * width:
+        return []
+    return _sliced(patch, math.ceil(length / pitch))
+
+
+def _pieces(patch: Polygon, radius: float) -> list[Polygon]:
+    """A patch cut across its longest direction, so that bumps to its pieces are short."""
+    box = _box(patch)
+    if box is None:
+        return []
+    length, width = (float(np.hypot(*side)) for side in box[1:])
     counts = np.arange(2, max(3, math.ceil(4 * length / radius)))
     half = length / counts / 2
     fits = half**2 + width**2 / 4 < (0.98 * radius) ** 2
     cost = counts * (width + radius - np.sqrt(np.maximum(radius**2 - half**2, 0.0)))
     count = int(counts[np.argmin(np.where(fits, cost, np.inf))]) if fits.any() else 2
-    found: list[Polygon] = []
-    for step in range(count):
-        first, last = (corners[0] + along * share / count for share in (step, step + 1))
-        strip = Polygon([first, last, last + across, first + across])
-        found += [part for part in polygons(patch.intersection(strip)) if part.area > 1e-5]
-    return found
+    return _sliced(patch, count)

@@ -47,7 +47,7 @@ _TOUCH = 0.004
 """How much loops overlap where bumps sweep what is left between them."""
 _GAP = 0.55
 """Tool widths between the two crossings from a loop to another and back."""
-_LEAST = 0.004
+_LEAST = 0.0065
 """Missed patches smaller than this share of the tool's square get no bump."""
 _MANY = 60
 _SMALLEST = 0.008
@@ -149,7 +149,6 @@ def _strokes(
     if options.min_turn_radius > 0:
         pieces = sharp_space(site, space, free_poles(site))
         tolerance = min(0.02, 0.05 * tool)
-        smallest *= 2.5
     else:
         pieces = [space.polygon]
         tolerance = min(0.002, 0.01 * tool)
@@ -317,7 +316,7 @@ def _driven_path(
     for _ in range(2):
         path, _ = driver.track.arrays()
         missed = target.difference(swept_shape(path, options.tool_width))
-        smallest = 3 * _SMALLEST * (options.tool_width / 0.4) ** 2
+        smallest = _SMALLEST * (options.tool_width / 0.4) ** 2
         more = cleanup_strokes(missed, options.tool_width, space, smallest)
         if not more:
             break

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polepilot.core import geometry
-from polepilot.core.geometry import Pose2D, angle_between, wrap_angle
+from polepilot.core.geometry import Pose2D, angle_between
 from polepilot.core.planning.curves import (
     CHANGE,
     Curve,
@@ -130,6 +130,12 @@ class Driver:
             heading is None or abs(angle_between(self.track.pose.heading, heading)) < 1e-6
         ):
             return True
+        if self.track.sign < 0:
+            saved = self.track.save()
+            self.track.turn_round()
+            if self._connect_here(place, heading):
+                return True
+            self.track.restore(saved)
         if self._connect_here(place, heading):
             return True
         if not back_out or self._patience <= 0:
@@ -296,7 +302,7 @@ class Driver:
     def _resume(self, points: Points, index: int) -> int | None:
         """Gets back onto ``points`` at the corner ``index`` or later; which corner comes next.
 
-        Where a leg cannot be entered forward, it is driven backward.
+        Where a leg cannot be entered forward, it is driven backward, and so is what follows.
         """
         tries = 0
         for leg in range(index, len(points) - 1):
@@ -309,11 +315,11 @@ class Driver:
             tries += 1
             if self._connect_here(there, heading):
                 return leg + 1
-            if self._connect_here(there, wrap_angle(heading + math.pi)):
-                self.track.append((("S", -length),))
-                if leg + 1 == len(points) - 1:
-                    return len(points)
-                continue
+            saved = self.track.save()
+            self.track.turn_round()
+            if self._connect_here(there, heading):
+                return leg + 1
+            self.track.restore(saved)
             if self.connect(there, heading):
                 return leg + 1
             if tries >= _MOST_TRIES:

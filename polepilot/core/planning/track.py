@@ -13,7 +13,7 @@ from polepilot.core.geometry import Pose2D, angle_between, wrap_angle
 from polepilot.core.planning.curves import CHANGE, STEP, Curve, joined, sample
 
 Points = NDArray[np.float64]
-Saved = tuple[int, int, Pose2D, float]
+Saved = tuple[int, int, Pose2D, float, int]
 
 PLAIN = math.radians(3.0)
 """A turn below this is left as it is where its legs are long enough."""
@@ -33,6 +33,8 @@ class Track:
     count: int = 1
     straight: float = 0.0
     """How far the robot can go straight back from here on its own track."""
+    sign: int = 1
+    """-1: driven the wrong way round; ``pose`` then looks out of the robot's back."""
     reserve: float = 0.0
     """How much of the leg after a corner left as it is must stay straight, metres."""
 
@@ -48,7 +50,7 @@ class Track:
         """Appends points after the first, which is where the track ends."""
         if len(gears):
             self.points.append(points[1:])
-            self.gears.append(gears)
+            self.gears.append(gears * np.int8(self.sign))
             self.count += len(gears)
         self.pose = pose
 
@@ -71,6 +73,12 @@ class Track:
         self.straight = straight
         self.reserve = 0.0
 
+    def turn_round(self) -> None:
+        """From here on what was forward is backward: the same curves, tail first."""
+        self.sign = -self.sign
+        self.pose = Pose2D(*self.pose.position, wrap_angle(self.pose.heading + math.pi))
+        self.straight = self.reserve = 0.0
+
     def straight_to(self, corner: Points) -> None:
         """Straight to a place on the line of the present heading, forward or back."""
         way = float(np.dot(corner - np.array(self.pose.position), self.ahead()))
@@ -83,7 +91,7 @@ class Track:
         back: list[int] = []
         rest = distance
         index = len(gears) - 1
-        heading = self.pose.heading
+        heading = self.pose.heading + (math.pi if self.sign < 0 else 0.0)
         while rest > 1e-6 and index >= 0:
             a, b = points[index + 1], points[index]
             step = float(np.hypot(*(b - a)))
@@ -100,9 +108,10 @@ class Track:
                 back.append(gear)
             rest -= step
             index -= 1
+        heading = wrap_angle(heading + (math.pi if self.sign < 0 else 0.0))
         self.add(
             np.array(taken),
-            np.array(back, np.int8),
+            np.array(back, np.int8) * np.int8(self.sign),
             Pose2D(float(taken[-1][0]), float(taken[-1][1]), heading),
         )
         self.straight = 0.0
@@ -115,10 +124,10 @@ class Track:
 
     def save(self) -> Saved:
         """What ``restore`` needs to forget all that is driven from here on."""
-        return len(self.points), self.count, self.pose, self.straight
+        return len(self.points), self.count, self.pose, self.straight, self.sign
 
     def restore(self, saved: Saved) -> None:
-        pieces, self.count, self.pose, self.straight = saved
+        pieces, self.count, self.pose, self.straight, self.sign = saved
         del self.points[pieces:]
         del self.gears[max(pieces - 1, 0) :]
 

@@ -160,6 +160,21 @@ static void a_missed_deadline_is_not_undone_by_late_bytes(void)
     CHECK(telemetry(STATE) == STATE_LINK_LOST);
 }
 
+static void a_repetition_ends_after_half_a_second(void)
+{
+    arm();
+    bench_run(499);
+    CHECK(telemetry(STATE) == STATE_LINK_LOST);
+    arm();
+    bench_run(499);
+    bench_packet(MSG_ARM, 2, NULL, 0);
+    CHECK(telemetry(STATE) == STATE_LINK_LOST);
+    arm();
+    bench_run(500);
+    bench_packet(MSG_ARM, 2, NULL, 0);
+    CHECK(telemetry(STATE) == STATE_ARMED);
+}
+
 static void duties_follow_their_slew_limit(void)
 {
     int i;
@@ -412,6 +427,7 @@ int main(void)
     nothing_is_live_before_hello();
     both_deadlines_to_the_millisecond();
     a_missed_deadline_is_not_undone_by_late_bytes();
+    a_repetition_ends_after_half_a_second();
     duties_follow_their_slew_limit();
     motors_are_never_plugged();
     backing_out_needs_no_dwell_after_standing();

@@ -49,7 +49,7 @@ def plan(
     """Plan a job on a site: its path, what it covers, what cannot be reached, how long it takes."""
     import json
 
-    from polepilot.core.errors import InputError
+    from polepilot.commands.files import write_whole
     from polepilot.core.planning.options import PlanOptions
     from polepilot.core.planning.plot import plot_svg
     from polepilot.core.site import read_site
@@ -66,10 +66,7 @@ def plan(
     with naming_file(site_file):
         result = make_plan(site, mode, route, options, end_heading)
     if plot is not None:
-        try:
-            plot.write_text(plot_svg(site, result), encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"--plot {plot}: cannot be written: {error.strerror}.") from error
+        write_whole({plot: plot_svg(site, result).encode("utf-8")}, "--plot")
     if as_json:
         typer.echo(json.dumps(result.to_json(), allow_nan=False))
     else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -58,6 +59,14 @@ def test_route_and_summary() -> None:
     assert "coverage" in run(DEMO, "--min-turn-radius", "0")
 
 
+def test_the_heading_at_the_end_of_a_route() -> None:
+    words = (DEMO, "--mode", "route", "--route", "Tour", "--min-turn-radius", "0", "--json")
+    for heading in (0.0, -2.0):
+        document = json.loads(run(*words, "--end-heading", str(heading)))
+        (x0, y0), (x1, y1) = document["path"][-2:]
+        assert math.atan2(y1 - y0, x1 - x0) == pytest.approx(heading, abs=0.01)
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -67,6 +76,7 @@ def test_route_and_summary() -> None:
         ([DEMO, "--clearance", "9"], f"^{DEMO}: the robot fits nowhere .* clearance of 900 cm"),
         ([DEMO, "--start", "99,1"], f"^{DEMO}: the start .* is not on the floor"),
         ([DEMO, "--route", "Tour"], "expected --mode route"),
+        ([DEMO, "--end-heading", "1"], "--end-heading is given with --mode scan"),
         ([DEMO, "--start", "1;2"], "--start is '1;2'"),
         ([DEMO, "--start", "nan,2"], "expected X,Y"),
         ([DEMO, "--tool-width", "nan"], "^--tool-width is nan"),

@@ -15,7 +15,7 @@ import httpx
 import pytest
 from server.conftest import Running
 from server.fakes import SQUARE, FakeRobot, TestClient
-from shapely import MultiPolygon, box
+from shapely import LineString, MultiPolygon, box
 
 from polepilot.core.errors import InputError, PlanError, SiteError
 from polepilot.core.geometry import Pose2D
@@ -56,6 +56,28 @@ def test_a_scan(client: TestClient, services: Services, square: int) -> None:
     kept = plan_of(services.store.plan(plan["id"]))
     assert kept.path.tolist() == plan["path"]
     assert kept.predicted.coverage == plan["predicted"]["coverage"]
+
+
+def test_no_go_areas_are_kept_and_not_driven_on(client: TestClient) -> None:
+    site = {**SQUARE, "no_go": [[[2.0, 2.0], [3.0, 2.0], [3.0, 3.0], [2.0, 3.0]]]}
+    made = client.post(f"{API}/sites", json=site)
+    assert made.status_code == 201, made.text
+    record = made.json()
+    assert client.get(f"{API}/sites/{record['id']}").json()["site"]["no_go"] == site["no_go"]
+    plan = client.post(f"{API}/plans", json={"site_id": record["id"], "mode": "scan"}).json()
+    assert LineString(plan["path"]).distance(box(2, 2, 3, 3)) >= plan["clearance"] - 1e-6
+    assert 0 <= plan["predicted"]["overlap"] < 1
+
+
+def test_a_route_ends_with_the_heading_asked_for(client: TestClient, square: int) -> None:
+    wanted = {"site_id": square, "mode": "route", "route": "Line", "end_heading": math.pi / 2}
+    answer = client.post(f"{API}/plans", json=wanted)
+    assert answer.status_code == 201, answer.text
+    path, gear = answer.json()["path"], answer.json()["gear"]
+    (x0, y0), (x1, y1) = path[-2:]
+    assert math.atan2((y1 - y0) * gear[-1], (x1 - x0) * gear[-1]) == pytest.approx(1.57, abs=0.06)
+    refused = client.post(f"{API}/plans", json={**wanted, "end_heading": "up"})
+    assert refused.status_code == 422
 
 
 def test_a_plan_begins_where_the_robot_stands(

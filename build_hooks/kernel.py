@@ -43,7 +43,7 @@ STRICT = ("-Wall", "-Wextra", "-Werror")
 SANITIZE = (
     *BASE,
     *("-O1", "-g", "-fno-omit-frame-pointer"),
-    *("-fsanitize=address,undefined", "-fno-sanitize-recover=all"),
+    *("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"),
 )
 ADVICE = "Install one (Debian: apt-get install gcc libc6-dev), or `pip install ziglang`."
 

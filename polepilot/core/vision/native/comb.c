@@ -5,6 +5,8 @@
  * of it says where to look, and the brightness, which they keep sharp, is read. */
 #include "search.h"
 
+#include <math.h>
+
 #define LONGEST 72         /* rows of a far code */
 #define GAP 22             /* rows without colour that a stretch may have */
 #define LEAST_SEGMENTS 9   /* rows of colour at least, in the shortest segments */
@@ -13,6 +15,7 @@
 #define LEAK 0.4f          /* of which so much is blurred into it */
 #define NEAR 3.3f          /* rows per segment from which on runs tell, */
 #define SHARP 5.5f         /* and from which on blurred colour does */
+#define ABOUT 3            /* segments about a near code whose colour is its own */
 #define FRAYED 8           /* rows by which a code may be shorter than its stretch of colour, */
 #define HIDDEN 2           /* and by which it may be longer */
 #define ROWS_APART 3       /* every third row is asked for faint colour */
@@ -95,11 +98,12 @@ static int match_stretch(eye_hits *hits, const float *sum, int top, int bottom, 
 }
 
 /* Whether a near code that the runs have shown covers the stretch. */
-static int is_known(const eye_hits *hits, int known, int from, int end)
+static int is_known(const eye_hits *hits, int known, int x, int from, int end)
 {
     for (const eye_hit *h = hits->hits + known; h < hits->hits + hits->n_hits; h++) {
         float unit = (h->bottom - h->top) / (float)(2 * h->bits + 1);
-        if (unit > NEAR && (float)from > h->top - 3 * unit && (float)end < h->bottom + 3 * unit)
+        if (unit > NEAR && fabsf(h->column - (float)x) < ABOUT * unit &&
+            (float)from > h->top - ABOUT * unit && (float)end < h->bottom + ABOUT * unit)
             return 1;
     }
     return 0;
@@ -122,7 +126,7 @@ void eye_match_comb(eye_hits *hits, const uint8_t *signal, int first, int last, 
             }
         int height = end - from + 1;
         if (from > last || height > LONGEST || (float)height < LEAST_SEGMENTS * EYE_SHORTEST ||
-            peak < 2 * EYE_LEAST_STEP || is_known(hits, known, from, end))
+            peak < 2 * EYE_LEAST_STEP || is_known(hits, known, x, from, end))
             continue;
         int top = from < BESIDE ? 0 : from - BESIDE;
         int bottom = end + BESIDE + 1 < rows ? end + BESIDE + 1 : rows;
@@ -150,7 +154,7 @@ void eye_match_faint(eye_hits *hits, int x)
             if (eye_colour(column + y * p->stride, hits->task) > EYE_FAINT)
                 end = y;
         int height = end - from + 1;
-        if (end == from || from >= p->rows || height > LONGEST || is_known(hits, 0, from, end))
+        if (end == from || from >= p->rows || height > LONGEST || is_known(hits, 0, x, from, end))
             continue;
         int room = LONGEST - height + BESIDE;
         int top = from < room ? 0 : from - room;

@@ -17,6 +17,7 @@
 #define LEAK_RIDGE 1.0
 #define GROWTH_PRIOR 0.15 /* rows by which bright segments may seem to grow: glare, tone curve */
 #define PITCH_PRIOR 0.03  /* radians by which camera or pole may lean towards each other */
+#define MOST_SAG 0.04     /* three times that of the nearest pole seen 10 degrees from level */
 #define DARK_NOISE 0.01   /* light whose photons are as many as what darkness has of noise */
 #define LEAST_CONTRAST 0.002 /* light */
 #define MOST_LAG 3        /* rows over which what is left over may be alike */
@@ -219,6 +220,7 @@ static int conclude(equations *sums, const double *guess, int rows, eye_scale *o
         out->sag = guess[EYE_SAG] * (information + sums->sag_pull) / information;
         out->sag_sigma = sqrt(variance / information);
     }
+    out->sag = eye_limit(out->sag, -MOST_SAG, MOST_SAG);
     out->noise = sqrt(sums->plain / rows) / contrast;
     return EYE_READ;
 }

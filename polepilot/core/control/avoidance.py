@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +11,22 @@ from numpy.typing import NDArray
 from polepilot.core.command import STAND, DriveCommand
 from polepilot.core.control.detour import Room, find
 from polepilot.core.control.memory import RADIUS, ObstacleMemory, Readings, Remembered
-from polepilot.core.control.stretches import Floats
+from polepilot.core.control.patience import Patience
+from polepilot.core.control.places import (
+    Floats,
+    as_plan,
+    before_gear_change,
+    beside,
+    braking_line,
+    onward,
+    stays,
+    tangent,
+)
+from polepilot.core.control.stretches import SPACING
 from polepilot.core.control.tracker import SEARCH_AHEAD, PathTracker
+from polepilot.core.control.way_back import Curves, Way, goals_on, ways_back
 from polepilot.core.geometry import Point, Pose2D, wrap_angle
 from polepilot.core.observation import PoseEstimate
-from polepilot.core.plan import Plan, PlanPart, Prediction
 from polepilot.core.scenery import Disc, Scenery
 from polepilot.core.site import Site
 from polepilot.core.vehicle import Proximity, Vehicle
@@ -35,10 +47,6 @@ LOOK = 2.0
 """So much of the path ahead is checked for conflicts, metres."""
 ASTRAY = 0.10
 """Farther from its path than this the plan says nothing about walls, metres."""
-AWAY = 0.20
-"""Farther than this from the next piece of the path it is not simply followed again, metres."""
-COME_AWAY = 0.6
-"""Metres from where it first had to stand; nearer it still counts as blocked."""
 FIRST_REJOIN = 1.6
 """So far behind the conflict the path is taken up again at the latest, metres."""
 REJOIN = 6.0
@@ -50,13 +58,17 @@ REPLAN_PERIOD = 0.5
 BACK_OFF_AFTER = 3.0
 """Seconds of standing before an obstacle without a way round, after which it makes room."""
 BACK_OFF = 0.35
-TWITCH = 0.08
-"""Who has not come farther than this has been standing, metres."""
+HELPS = 0.8
+"""It makes room only before what is nearer than this, metres."""
 FAR_LEFT = 0.35
 """An obstacle whose centre is farther left of the path than this does not stand on it: it is
 passed on the right. (The paper always turns left, which would mean a way of more than a metre.)"""
-RUN_UP = 15
-"""Samples of the path that have to be free, and forward, where it is taken up again."""
+BACK_SPEED = 0.12
+"""Of driving backward where no plan says so, m/s: nothing looks that way."""
+HELD_UP = 2.0
+"""Seconds of standing on the way back to the path; a change of gear takes less."""
+UNSEEN = 3.0
+"""Seconds without a reading of what it waits for, after which it goes to look."""
 LEAD_OUT = 30
 """Samples of the path that are appended to a detour, so that it ends along the path."""
 
@@ -66,12 +78,17 @@ class ObstacleAvoidance:
 
     The paper's rule: turn left, keep 30 cm from the obstacle, rejoin the route. Readings that the
     site explains are no obstacles. Where the left is closed by walls, the robot stands and says
-    so; it goes on as soon as the obstacle has gone.
+    so. Once the obstacle has gone, it takes its path up where it left it, by curves that its front
+    wheel can drive: where it stands then, there may be no room to turn round.
+
+    Args:
+        curves: ways from one pose to another that the front wheel can drive.
     """
 
-    def __init__(self, proximity: Proximity, vehicle: Vehicle, site: Site) -> None:
+    def __init__(self, proximity: Proximity, vehicle: Vehicle, site: Site, curves: Curves) -> None:
         self._proximity = proximity
         self._vehicle = vehicle
+        self._curves = curves
         poles = [(mark.position, mark.kind.diameter / 2) for mark in site.landmarks]
         self._barriers = Scenery(site.barriers(), poles)
         self._memory = ObstacleMemory(proximity, Scenery(site.segments(), poles))
@@ -82,13 +99,18 @@ class ObstacleAvoidance:
         self._about: Point = (0.0, 0.0)
         self._away = False
         """A detour was begun that has not come back to the path yet."""
+        self._search: Iterator[Way | None] | None = None
+        """For a way back to the path, under way."""
+        self._returning = False
+        """The detour is a way back to the path, not one round an obstacle."""
+        self._looking = False
+        """It goes back to its path to look whether what it waits for is still there."""
+        self._looked = False
+        """It did so once since it was blocked."""
         self._side = 0
         """Of the present detour: 1 left, -1 right."""
         self._planned_at = -math.inf
-        self._standing_since: float | None = None
-        self._stood_at: Point = (0.0, 0.0)
-        self._blocked_since: float | None = None
-        self._blocked_at: Point = (0.0, 0.0)
+        self._patience = Patience()
         self._backing = 0.0
         self._last = STAND
         self.reason = ""
@@ -112,34 +134,30 @@ class ObstacleAvoidance:
     def reset(self) -> None:
         """Forget all: the robot was carried away, or its pose was found anew."""
         self._memory.forget()
-        self._detour = None
+        self._detour = self._search = None
         self._backing = 0.0
-        self._standing_since = self._blocked_since = None
+        self._patience.forget()
         self._last = STAND
         self.reason = ""
 
     def take_up(self) -> None:
         """It goes on after a pause: what it waited for before does not count any more."""
-        self._standing_since = self._blocked_since = None
+        self._patience.forget()
         self._planned_at = -math.inf
+        self._search = None
+        self._looked = False
         self._last = STAND
         if self._detour is not None:
             self._detour.take_up()
 
     def blocked_for(self, now: float) -> float:
         """Seconds since the robot last got ahead; 0 unless something is in the way."""
-        if self._blocked_since is None or not self.active:
-            return 0.0
-        return now - self._blocked_since
+        return self._patience.blocked_for(now) if self.active else 0.0
 
     def make_room(self, now: float, pose: Pose2D) -> None:
         """Back off a little, if there is room: the board holds the robot before something."""
         self._backing = BACK_OFF
-        if self._blocked_since is None:
-            self._blocked_since, self._blocked_at = now, pose.position
-
-    def _stood_for(self, now: float) -> float:
-        return 0.0 if self._standing_since is None else now - self._standing_since
+        self._patience.block(now, pose)
 
     def update(
         self,
@@ -163,28 +181,19 @@ class ObstacleAvoidance:
         astray = abs(tracker.deviation) > ASTRAY or not tracker.aligned
         if not self._safe(pose, command, astray):
             self.reason = "Waiting: something is too close ahead."
-            if command.speed > 0 and self._stood_for(now) > BACK_OFF_AFTER:
+            if command.speed > 0 and self._patience.stood_for(now) > BACK_OFF_AFTER:
                 self._backing = BACK_OFF
             command = DriveCommand(0.0, command.steering)
-        self._watch(now, pose, command)
+        self._patience.watch(
+            now,
+            pose,
+            stands=command.speed == 0,
+            waits=self.active,
+            gives_way=self._backing > 0 or (self._detour is not None and self._looking),
+        )
+        self._looked &= self._patience.blocked
         self._last = command
         return command
-
-    def _watch(self, now: float, pose: Pose2D, command: DriveCommand) -> None:
-        """For how long has it been standing, and has it not come away from here?"""
-        if self._blocked_since is not None and pose.distance_to(self._blocked_at) > COME_AWAY:
-            self._blocked_since = None
-        if not self.active:
-            self._standing_since = None
-            return
-        if self._standing_since is not None:
-            # A short twitch after each new plan is no progress.
-            if pose.distance_to(self._stood_at) > TWITCH:
-                self._standing_since = None
-        elif command.speed == 0:
-            self._standing_since, self._stood_at = now, pose.position
-        if self._blocked_since is None and command.speed == 0:
-            self._blocked_since, self._blocked_at = now, pose.position
 
     def _choose(self, now: float, dt: float, pose: Pose2D, tracker: PathTracker) -> DriveCommand:
         if self._backing > 0:
@@ -192,28 +201,40 @@ class ObstacleAvoidance:
         if self._detour is not None:
             return self._follow(now, dt, pose, tracker)
         conflict = self._conflict(tracker)
+        rest = tracker.path_ahead(SEARCH_AHEAD)
         if conflict is None and self._away:
-            self._away = self._beside(pose, tracker)
+            self._away = beside(pose, *rest)
             if self._away:
-                conflict = self._remaining(pose, tracker)
+                return self._return(now, dt, pose, tracker)
         if conflict is None:
+            self._search = None
             self.reason = ""
             command = tracker.update(pose, dt)
-            near = self._gaps(np.array([pose.position]))[0] < LOOK
-            if near and command.speed > DETOUR_SPEED:
+            if self._gap(pose) < LOOK and command.speed > DETOUR_SPEED:
                 return DriveCommand(DETOUR_SPEED, command.steering)
             return command
+        if self._looking and self._search is not None:
+            return self._return(now, dt, pose, tracker)
+        self._search = None
         if now - self._planned_at >= REPLAN_PERIOD:
             self._side = 0
             if self._plan(now, pose, tracker, conflict):
-                self._standing_since = None
+                self._patience.move_on()
                 return self._follow(now, dt, pose, tracker)
-        if self._stood_for(now) > BACK_OFF_AFTER and self._close(pose):
+        if self._patience.stood_for(now) > BACK_OFF_AFTER and self._gap(pose) < HELPS:
             self._backing = BACK_OFF
-            self._standing_since = None
+            self._patience.move_on()
+        elif not self._looked and now - conflict[1].seen > UNSEEN and beside(pose, *rest):
+            # It stands where it made room, and nothing is to be seen from here.
+            self._looked = True
+            self._begin_search(now, pose, tracker, look=True)
         return STAND
 
     # ---- is something in the way? ------------------------------------------------------------
+
+    def _gap(self, pose: Pose2D) -> float:
+        """From the body's edge to the nearest obstacle."""
+        return float(self._gaps(np.array([pose.position]))[0])
 
     def _gaps(self, points: Floats) -> Floats:
         """From the body's edge, were it at each of these points, to the nearest obstacle."""
@@ -242,16 +263,6 @@ class ObstacleAvoidance:
         obstacle = min(known, key=lambda one: math.dist(one.position, place))
         return last, obstacle
 
-    def _beside(self, pose: Pose2D, tracker: PathTracker) -> bool:
-        """Whether the next piece of the path is too far away to be followed from here."""
-        points, _, _ = tracker.path_ahead(SEARCH_AHEAD)
-        return len(points) > 0 and float(np.hypot(*(points - pose.position).T).min()) > AWAY
-
-    def _close(self, pose: Pose2D) -> bool:
-        """Whether more room in front would help."""
-        nearest = self._gaps(np.array([pose.position]))[0]
-        return bool(nearest < 0.8)
-
     def _safe(self, pose: Pose2D, command: DriveCommand, astray: bool) -> bool:
         """Whether the robot could still stop in time after another moment of this command.
 
@@ -261,20 +272,9 @@ class ObstacleAvoidance:
         astray = astray or self.active
         if command.speed == 0 or not (bodies or astray):
             return True
-        discs = Scenery([], bodies)
         walls = self._barriers.near(pose.position, 1.0) if astray else Scenery()
-        speed = abs(command.speed)
-        reach = 0.06 + speed * 0.2 + speed**2 / (2 * self._vehicle.max_acceleration)
-        curvature = math.tan(command.steering) / self._vehicle.wheelbase
-        way = np.sign(command.speed) * reach * np.arange(5) / 4
-        turn = way * curvature / 2
-        line = np.column_stack(
-            [
-                pose.x + way * np.cos(pose.heading + turn),
-                pose.y + way * np.sin(pose.heading + turn),
-            ]
-        )
-        for scenery, least in ((discs, LEAST + 0.02), (walls, WALL_STOP)):
+        line = braking_line(pose, command, self._vehicle)
+        for scenery, least in ((Scenery([], bodies), LEAST + 0.02), (walls, WALL_STOP)):
             gaps = scenery.distances(line) - self._vehicle.body_radius
             if ((gaps[1:] < least) & (gaps[1:] < gaps[0] - 0.005)).any():
                 return False
@@ -295,27 +295,29 @@ class ObstacleAvoidance:
         last, obstacle = conflict
         points, along, gears = tracker.path_ahead(REJOIN)
         place = int(np.argmin(np.hypot(*(points - obstacle.center).T)))
-        tangent = _tangent(points, place)
+        direction = tangent(points, place)
         aside = obstacle.center - points[place]
-        left_of_path = math.cos(tangent) * aside[1] - math.sin(tangent) * aside[0]
+        left_of_path = math.cos(direction) * aside[1] - math.sin(direction) * aside[0]
         sides = [self._side] if self._side else [1]
         if not self._side and left_of_path > FAR_LEFT:
             sides = [-1, 1]
         farthest = last + FIRST_REJOIN
         if self.blocked_for(now) > PATIENCE:
             sides, farthest = [1, -1], float(along[-1])
-        free = _stays((self._gaps(points) >= CONCERN) & (gears > 0))
+        free = stays((self._gaps(points) >= CONCERN) & (gears > 0))
         farthest = min(farthest, float(along[-1]))
         wanted = np.append(np.arange(last + 0.30, farthest - 0.10, 0.30), max(farthest, last))
         places = np.searchsorted(along, wanted)
         places = places[places < len(points)]
         places = places[free[places]]
         if self.blocked_for(now) <= PATIENCE:
-            places = places[_onward(pose, points, places)]
+            places = places[onward(pose, points, places)]
         where = f"{max(0.0, pose.distance_to(obstacle.position)):.1f} m away"
         for side in sides:
             # The line from the obstacle to its other side is not to be crossed.
-            barrier = (obstacle.position, wrap_angle(tangent - side * math.pi / 2))
+            barrier = None
+            if obstacle.confirmed:
+                barrier = (obstacle.position, wrap_angle(direction - side * math.pi / 2))
             if self._to(pose, points, along, places, barrier):
                 self._side = side
                 name = "left" if side > 0 else "right"
@@ -334,7 +336,7 @@ class ObstacleAvoidance:
         points: Floats,
         along: Floats,
         places: NDArray[np.int64],
-        barrier: tuple[Point, float],
+        barrier: tuple[Point, float] | None,
     ) -> bool:
         """Plan a detour to one of these places of the path."""
         vehicle = self._vehicle
@@ -350,12 +352,15 @@ class ObstacleAvoidance:
         index = int(places[found[0]])
         self._way = found[1]
         self._rejoin_at = float(along[index])
-        self._about = barrier[0]
+        if barrier is not None:
+            self._about = barrier[0]
         self._away = True
+        self._returning = self._looking = False
         # What follows in the same gear: the detour is to end along the path, but not to back.
         rest = points[index + 1 : index + 1 + LEAD_OUT]
-        path = np.vstack([self._way, rest[: _before_gear_change(rest)]])
-        self._detour = PathTracker(_as_plan(path), vehicle, rolling=self._last)
+        path = np.vstack([self._way, rest[: before_gear_change(rest)]])
+        plan = as_plan(path, np.ones(len(path) - 1, np.int8), 2 * RADIUS)
+        self._detour = PathTracker(plan, vehicle, rolling=self._last)
         return True
 
     def _follow(self, now: float, dt: float, pose: Pose2D, tracker: PathTracker) -> DriveCommand:
@@ -366,26 +371,106 @@ class ObstacleAvoidance:
         if detour.progress >= steps or detour.done:
             tracker.resume_at(self._rejoin_at + detour.progress - steps, rolling=self._last)
             self._detour = None
-            self._away = False
+            self._away = self._looking = False
             self.reason = ""
             return tracker.update(pose, dt)
         rest, _, _ = detour.path_ahead(1.5)
         tight = len(rest) > 0 and self._gaps(rest).min() < LEAST + 0.02
         astray = abs(detour.deviation) > 0.12 or detour.off_route
-        stuck = self._stood_for(now) > REPLAN_PERIOD
+        if self._returning:
+            return self._follow_back(now, dt, pose, detour, tight or astray)
+        stuck = self._patience.stood_for(now) > REPLAN_PERIOD
         if (tight or astray or stuck) and now - self._planned_at >= REPLAN_PERIOD:
             found = self._plan(now, pose, tracker, self._remaining(pose, tracker))
             detour = self._detour
             if not found or detour is None:
-                if self._stood_for(now) > BACK_OFF_AFTER:
+                if self._patience.stood_for(now) > BACK_OFF_AFTER:
                     self._backing = BACK_OFF
                 return STAND
-        if stuck and self._stood_for(now) > BACK_OFF_AFTER:
+        if stuck and self._patience.stood_for(now) > BACK_OFF_AFTER:
             self._backing = BACK_OFF
             self._detour = None
             return STAND
         command = detour.update(pose, dt)
         return DriveCommand(min(command.speed, DETOUR_SPEED), command.steering)
+
+    def _follow_back(
+        self, now: float, dt: float, pose: Pose2D, detour: PathTracker, wrong: bool
+    ) -> DriveCommand:
+        """Along the way back to the path, unless it has to be looked for anew."""
+        held_up = self._patience.stood_for(now) > HELD_UP
+        if wrong or held_up:
+            if held_up and detour.gear > 0:
+                self._backing = BACK_OFF
+            self._detour = None
+            self._looking = False
+            return STAND
+        command = detour.update(pose, dt)
+        return DriveCommand(min(max(command.speed, -BACK_SPEED), DETOUR_SPEED), command.steering)
+
+    # ---- back to the path --------------------------------------------------------------------
+
+    def _return(self, now: float, dt: float, pose: Pose2D, tracker: PathTracker) -> DriveCommand:
+        """Nothing is in the way, but it is not on its path: take that up where it was left."""
+        if self._search is None:
+            if now - self._planned_at < REPLAN_PERIOD:
+                return STAND
+            self._begin_search(now, pose, tracker, look=False)
+        for way in self._search or ():
+            if way is None:
+                return STAND  # the next portion in the next tick
+            self._search = None
+            self._take(way, tracker)
+            return self._follow(now, dt, pose, tracker)
+        self._search = None
+        return self._no_way_back(now, dt, pose, tracker)
+
+    def _no_way_back(
+        self, now: float, dt: float, pose: Pose2D, tracker: PathTracker
+    ) -> DriveCommand:
+        """The curves did not do: a longer way, forward."""
+        self._planned_at = now
+        if self._looking:
+            self._looking = False
+            return STAND
+        if self._plan(now, pose, tracker, self._remaining(pose, tracker)):
+            self._patience.move_on()
+            self.reason = "Back to the path."
+            return self._follow(now, dt, pose, tracker)
+        self.reason = "Waiting: there is no room to get back to the path."
+        if self._patience.stood_for(now) > BACK_OFF_AFTER:
+            self._backing = BACK_OFF
+        return STAND
+
+    def _begin_search(self, now: float, pose: Pose2D, tracker: PathTracker, *, look: bool) -> None:
+        self._planned_at = now
+        self._looking = look
+        self.reason = "Going to look whether the way is free." if look else "Back to the path."
+        points, along, gears = tracker.path_ahead(REJOIN)
+        room = self._gaps(points)
+        free = stays(room >= CONCERN)
+        if look:
+            # Up to where the path is free, and with all the room that there should be.
+            free = np.logical_and.accumulate(room >= CONCERN) & (room >= KEEP)
+        goals = goals_on(points, along, gears, free, far=not look)
+        self._search = ways_back(
+            pose, goals, self._curves, self._spare, self._vehicle.plan_turn_radius
+        )
+
+    def _spare(self, points: Floats) -> Floats:
+        """How much more room than needed there is at each of these points."""
+        walls = self._barriers.distances(points) - self._vehicle.body_radius - WALL_ROOM
+        return np.minimum(walls, self._gaps(points) - KEEP)
+
+    def _take(self, way: Way, tracker: PathTracker) -> None:
+        """Set out on a way back, and a little along the path after it."""
+        self._way = way.points
+        self._rejoin_at = way.goal.along
+        rest = tracker.path_ahead(way.goal.skipped + LEAD_OUT * SPACING)
+        plan = as_plan(*way.led_out(*rest), 2 * RADIUS)
+        self._detour = PathTracker(plan, self._vehicle)
+        self._returning = self._away = True
+        self._patience.move_on()
 
     def _remaining(self, pose: Pose2D, tracker: PathTracker) -> tuple[float, Remembered]:
         """The conflict that the present detour is about, seen afresh."""
@@ -403,58 +488,11 @@ class ObstacleAvoidance:
         behind = pose.ahead(-(self._vehicle.body_radius + 0.10))
         discs = Scenery([], self.obstacles)
         room = min(self._barriers.distance(behind), discs.distance(behind))
-        self._backing -= 0.12 * dt
+        self._backing -= BACK_SPEED * dt
         if self._backing <= 0 or room < self._vehicle.body_radius + WALL_ROOM:
             self._backing = 0.0
-            self._standing_since = None
+            self._patience.move_on()
             return STAND
         self.reason = "Backing off to make room."
         self._away = True
-        return DriveCommand(-0.12, 0.0)
-
-
-def _onward(pose: Pose2D, points: Floats, places: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which places can be arrived at along the path, not against it: the next pass comes back."""
-    offset = points[places] - pose.position
-    along = points[np.minimum(places + 1, len(points) - 1)] - points[np.maximum(places - 1, 0)]
-    onward: NDArray[np.bool_] = (offset * along).sum(axis=1) > 0
-    return onward
-
-
-def _stays(good: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Where it is good, and remains so for the next 30 cm (or to the end)."""
-    result = good.copy()
-    for shift in range(1, min(RUN_UP, len(good))):
-        result[:-shift] &= good[shift:]
-    return result
-
-
-def _before_gear_change(points: Floats) -> int:
-    """How many of the points come before the line turns back on itself."""
-    steps = np.diff(points, axis=0)
-    if len(steps) < 2:
-        return len(points)
-    back = (steps[:-1] * steps[1:]).sum(axis=1) < 0
-    return int(np.argmax(back)) + 2 if back.any() else len(points)
-
-
-def _tangent(points: Floats, index: int) -> float:
-    """Direction of the line at one of its points."""
-    first, last = max(index - 1, 0), min(index + 1, len(points) - 1)
-    step = points[last] - points[first]
-    return math.atan2(step[1], step[0])
-
-
-def _as_plan(path: Floats) -> Plan:
-    count = len(path)
-    return Plan(
-        mode="route",
-        path=path,
-        gear=np.ones(count - 1, np.int8),
-        parts=(PlanPart("route", 0, count - 1),),
-        unreachable=(),
-        predicted=Prediction(1.0, 0.0, 0.0, 0),
-        tool_width=2 * RADIUS,
-        clearance=0.0,
-        min_turn_radius=0.0,
-    )
+        return DriveCommand(-BACK_SPEED, 0.0)

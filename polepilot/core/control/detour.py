@@ -40,14 +40,15 @@ def find(
     start: Point,
     goals: Sequence[Point],
     obstacles: Sequence[Disc],
-    barrier: tuple[Point, float],
+    barrier: tuple[Point, float] | None,
     scenery: Scenery,
     room: Room,
 ) -> tuple[int, Floats] | None:
     """The cheapest way from start to any of the goals that keeps clear of everything.
 
     Args:
-        barrier: a place and a direction: the way does not cross the line from there.
+        barrier: a place and a direction: the way does not cross the line from there; None where
+            there is none.
 
     Returns:
         Which goal, and the way, N x 2 in `map`; None where no goal can be reached.
@@ -59,12 +60,11 @@ def find(
     grid = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), axis=-1)
     places = low + grid.reshape(-1, 2) * CELL
     cost = _cost(places, start, obstacles, scenery, room).reshape(shape)
-    end = (
-        barrier[0][0] + BARRIER * math.cos(barrier[1]),
-        barrier[0][1] + BARRIER * math.sin(barrier[1]),
-    )
-    fence = Scenery([(barrier[0], end)]).distances(places).reshape(shape)
-    cost[fence < 0.75 * CELL] = np.inf
+    if barrier is not None:
+        (x, y), direction = barrier
+        end = (x + BARRIER * math.cos(direction), y + BARRIER * math.sin(direction))
+        fence = Scenery([((x, y), end)]).distances(places).reshape(shape)
+        cost[fence < 0.75 * CELL] = np.inf
     cells = _search(cost, _cell(start, low, shape), {_cell(goal, low, shape) for goal in goals})
     if cells is None:
         return None

@@ -27,6 +27,9 @@ NEAR = 2.0
 """Metres."""
 CONFIRM = 3
 """Readings before an obstacle counts."""
+MOST_PUSHED = 0.30
+"""Who would have to stand farther than this from where it was read last, metres, stands there no
+more."""
 MISSES = 4
 """Free looks in a row at where it should be, after which it is gone."""
 _SAME = 0.80
@@ -47,6 +50,8 @@ class Remembered:
     """When it was last read."""
     hits: int = 1
     misses: int = 0
+    pushed: float = 0.0
+    """So far has it been moved out of free beams since it was read last, metres."""
     predicted: float = field(default=0.0)
 
     @property
@@ -166,7 +171,7 @@ class ObstacleMemory:
             gains = one.covariance @ np.linalg.inv(one.covariance + noise)
             one.center = one.center + gains @ (touching - one.center)
             one.covariance = one.covariance - gains @ one.covariance
-        one.seen, one.hits, one.misses = now, one.hits + 1, 0
+        one.seen, one.hits, one.misses, one.pushed = now, one.hits + 1, 0, 0.0
 
     def _look_through(self, sensor: Pose2D, reading: float) -> None:
         """What a beam looks past cannot stand in it: push it aside, or take it for gone."""
@@ -178,10 +183,12 @@ class ObstacleMemory:
             side = 1.0 if y >= 0 else -1.0
             # The edge of the beam is to be a tangent of the disc.
             missing = RADIUS - (abs(y) * math.cos(HALF_BEAM) - x * math.sin(HALF_BEAM))
-            if missing > 0.30 or not one.confirmed:
+            # Pushed on and on by a beam it would be before it for ever, and never gone.
+            if missing + one.pushed > MOST_PUSHED or not one.confirmed:
                 one.misses += 1
             else:
-                shift = min(missing, 0.05)
+                shift = min(max(missing, 0.0), 0.05)
+                one.pushed += shift
                 heading = sensor.heading + side * (math.pi / 2 + HALF_BEAM)
                 one.center = one.center + shift * np.array([math.cos(heading), math.sin(heading)])
 

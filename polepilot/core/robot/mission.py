@@ -16,6 +16,7 @@ from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.observation import PoseEstimate
 from polepilot.core.plan import Mode, Plan
 from polepilot.core.planning.swept import SweptArea
+from polepilot.core.robot.curves import curves_of
 from polepilot.core.robot.recorder import Recorder
 from polepilot.core.robot.snapshot import MissionStatus
 from polepilot.core.scenery import Scenery
@@ -94,7 +95,9 @@ class Mission:
         self._body_radius = model.vehicle.body_radius
         self._blind_since: float | None = None
         self._tracker = PathTracker(plan, model.vehicle)
-        self._avoidance = ObstacleAvoidance(model.proximity, model.vehicle, site)
+        self._avoidance = ObstacleAvoidance(
+            model.proximity, model.vehicle, site, curves_of(model.vehicle)
+        )
         self._swept = None if plan.area.is_empty else SweptArea(plan.area, plan.tool_width)
         self._stroke_from: Point | None = None
         self._last: Pose2D | None = None

@@ -16,6 +16,7 @@ from polepilot.core.control.tracker import PathTracker
 from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.observation import PoseEstimate, Status
 from polepilot.core.plan import Plan, PlanPart, Prediction
+from polepilot.core.robot.curves import curves_of
 from polepilot.core.scenery import Scenery
 from polepilot.core.sim.motion import Actuation, Disturbances, Motion
 from polepilot.core.sim.obstacle import Obstacle
@@ -146,7 +147,7 @@ def meet(
         start = Pose2D(x, y, math.atan2(next_y - y, next_x - x))
     motion = Motion(VEHICLE, PanUnit(), Disturbances(), rng, full_speed=FULL_SPEED, pose=start)
     tracker = PathTracker(plan_of(path, gear), VEHICLE)
-    avoidance = ObstacleAvoidance(Proximity(), VEHICLE, site)
+    avoidance = ObstacleAvoidance(Proximity(), VEHICLE, site, curves_of(VEHICLE))
     walls = Scenery(site.segments())
     poles = [(mark.position, mark.kind.diameter / 2) for mark in site.landmarks]
     scene = walls.with_discs(poles)

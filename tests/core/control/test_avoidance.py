@@ -13,6 +13,7 @@ from polepilot.core.control.tracker import PathTracker
 from polepilot.core.geometry import Pose2D
 from polepilot.core.landmark import Landmark
 from polepilot.core.observation import PoseEstimate, Status
+from polepilot.core.robot.curves import curves_of
 from polepilot.core.scenery import Scenery
 from polepilot.core.sim.obstacle import Obstacle
 from polepilot.core.site import Site
@@ -156,7 +157,7 @@ def test_what_the_site_shows_is_no_obstacle(seed: int) -> None:
 
 
 def test_without_sensors_nothing_is_avoided() -> None:
-    avoidance = ObstacleAvoidance(Proximity(), VEHICLE, ROOM)
+    avoidance = ObstacleAvoidance(Proximity(), VEHICLE, ROOM, curves_of(VEHICLE))
     tracker = PathTracker(plan_of(LINE), VEHICLE)
     estimate = PoseEstimate(0.0, Pose2D(1, 3, 0), np.eye(3) * 1e-4, Status.TRACKING)
     plain = PathTracker(plan_of(LINE), VEHICLE)
@@ -169,7 +170,7 @@ def test_without_sensors_nothing_is_avoided() -> None:
 
 
 def test_reset_forgets() -> None:
-    avoidance = ObstacleAvoidance(Proximity(), VEHICLE, ROOM)
+    avoidance = ObstacleAvoidance(Proximity(), VEHICLE, ROOM, curves_of(VEHICLE))
     tracker = PathTracker(plan_of(LINE), VEHICLE)
     for tick in range(6):
         now = tick * 0.05
@@ -201,6 +202,31 @@ def test_memory_gives_up_what_is_seen_to_be_gone() -> None:
     now = looks(memory, 6, 0.8)
     looks(memory, 6, 1.5, now)
     assert memory.obstacles == []
+
+
+def test_memory_does_not_push_what_has_gone_before_the_beam_for_ever() -> None:
+    # Read just beside the middle of the beam, and not there any more.
+    memory = ObstacleMemory(Proximity(), Scenery(ROOM.segments()))
+    now = looks(memory, 6, 0.8)
+    sensor = Pose2D(2.12, 3.0, 0.0)
+    for tick in range(40):
+        # The robot turns slowly to where the beam's edge has pushed it.
+        begin = now + tick * 0.05
+        there = memory.obstacles[0].position if memory.obstacles else (9.0, 3.0)
+        bearing = sensor.bearing_to(there)
+        aside = 0.12 if bearing >= 0 else -0.12
+        pose = Pose2D(2.0, 3.0, bearing - aside)
+        memory.observe(begin, pose, (1.5, 1.5, 1.5), 0.01, 0.005)
+    assert memory.obstacles == []
+
+
+def test_memory_keeps_who_stands_a_little_beside_where_it_was_believed() -> None:
+    memory = ObstacleMemory(Proximity(), Scenery(ROOM.segments()))
+    now = looks(memory, 6, 0.8)
+    # The free beam looks past its place by a good hand's breadth: pushed aside, not forgotten.
+    for tick in range(20):
+        memory.observe(now + tick * 0.05, Pose2D(2, 3, -0.25), (1.5, 1.5, 1.5), 0.01, 0.005)
+    assert len(memory.obstacles) == 1
 
 
 @pytest.mark.parametrize(("x", "longest"), [(0.9, FORGET), (2.0, FORGET_NEAR)])

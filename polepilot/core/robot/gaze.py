@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 from polepilot.core.geometry import Pose2D
 from polepilot.core.landmark import Landmark
+from polepilot.core.observation import PoseEstimate, Status
 from polepilot.core.scenery import Scenery
 from polepilot.core.vehicle import Camera, PanUnit
 
@@ -18,8 +19,15 @@ SHORT_OF_AXIS = 0.10
 """A line of sight ends so far before the landmark, which may stand at a wall, metres."""
 RENEW = 0.5
 """Seconds between two looks at the map."""
-FULL_EVERY = 4
-"""Every so many turns the whole range is swept: landmarks get moved, and poses can be wrong."""
+FULL_AFTER = 12.0
+"""So many seconds after the last time it looks as far as the camera turns, to the other side than
+then: landmarks get moved, and poses can be wrong."""
+FULL_IN_DOUBT = 24.0
+"""The same while the pose is in doubt: what is known to be in sight goes before."""
+BEYOND = 0.5
+"""Share of half the angle of view beyond the end of the pan range that is counted on."""
+
+_KNOWN = (Status.TRACKING, Status.DEGRADED)
 
 
 class Gaze:
@@ -43,18 +51,39 @@ class Gaze:
         self._scenery = scenery
         self._renewed = -math.inf
         self._between: tuple[float, float] | None = None
+        self._turns = -1
+        self._full = True
+        """The present sweep goes on to the end of the range."""
+        self._doubtful = False
+        """The pose was in doubt when the present sweep began."""
+        self._full_at = -math.inf
+        self._full_side = -1
 
-    def between(self, now: float, pose: Pose2D, turns: int) -> tuple[float, float] | None:
-        """Two pan angles to sweep between from ``pose``; None for the whole range.
+    def between(
+        self, now: float, estimate: PoseEstimate | None, turns: int
+    ) -> tuple[float, float] | None:
+        """Two pan angles to sweep between; None for the whole range.
 
         Args:
+            estimate: where it stands. The less it has seen lately the more it matters to look
+                where there is something: also a doubtful pose will do.
             turns: how often the sweep has turned round so far.
         """
-        if turns % FULL_EVERY == 0:
+        known = estimate is not None and estimate.status in _KNOWN
+        doubtful = estimate is not None and estimate.status is Status.DEGRADED
+        if turns != self._turns:
+            self._turns, self._doubtful = turns, doubtful
+            due = now - self._full_at >= (FULL_IN_DOUBT if doubtful else FULL_AFTER)
+            self._full = due and turns % 2 != self._full_side
+            if self._full:
+                self._full_at, self._full_side = now, turns % 2
+        elif doubtful and not self._doubtful:
+            self._full = False  # first something that is known to be there
+        if self._full or not known or estimate is None:
             return None
         if now - self._renewed >= RENEW:
             self._renewed = now
-            self._between = self._look(pose)
+            self._between = self._look(estimate.pose)
         return self._between
 
     def _look(self, pose: Pose2D) -> tuple[float, float] | None:
@@ -62,8 +91,10 @@ class Gaze:
         bearings = [
             axis.bearing_to(mark.position) for mark in self._landmarks if self._seen(axis, mark)
         ]
-        inside = [b for b in bearings if self._pan.minimum <= b <= self._pan.maximum]
-        if len(inside) < 2:
+        beyond = BEYOND * self._camera.half_view
+        low, high = self._pan.minimum - beyond, self._pan.maximum + beyond
+        inside = [bearing for bearing in bearings if low <= bearing <= high]
+        if not inside:
             return None
         return min(inside) - MARGIN, max(inside) + MARGIN
 

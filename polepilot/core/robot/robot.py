@@ -403,9 +403,7 @@ class Robot:
         latest = self._pan.latest
         rate = 0.0
         if self._gaze is not None:
-            between = None
-            if self._estimate is not None and self._estimate.status is Status.TRACKING:
-                between = self._gaze.between(now, self._estimate.pose, self._sweep.turns)
+            between = self._gaze.between(now, self._estimate, self._sweep.turns)
             rate = self._sweep.rate(None if latest is None else latest.angle, between)
         self._host.pan(round(1000 * rate))
         self._line.write(now)

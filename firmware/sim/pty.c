@@ -103,14 +103,30 @@ size_t pty_read(uint8_t *bytes, size_t size)
     return count > 0 ? (size_t)count : 0u;
 }
 
+/* What was sent last and not read must not wait for whoever opens the line next. */
+static void forget(void)
+{
+    int slave = open(device, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+
+    if (slave >= 0) {
+        (void)tcflush(slave, TCIOFLUSH);
+        (void)close(slave);
+    }
+}
+
 size_t pty_write(const uint8_t *bytes, size_t length)
 {
+    static int open_before;
     ssize_t count;
 
     if (nobody_there()) {
-        (void)tcflush(master, TCOFLUSH);
+        if (open_before) {
+            forget();
+        }
+        open_before = 0;
         return length;
     }
+    open_before = 1;
     count = write(master, bytes, length);
     return count > 0 ? (size_t)count : 0u;
 }

@@ -9,6 +9,7 @@
 #include <time.h>
 
 #include "core/board.h"
+#include "core/frame.h"
 #include "core/hal.h"
 #include "core/protocol.h"
 #include "core/settings.h"
@@ -31,6 +32,24 @@ static size_t unsent_length;
 static uint64_t sent_total;
 static uint8_t hanging;
 static volatile sig_atomic_t ended;
+static FILE *journal;
+static uint8_t frame_ended; /* the core's last byte was a zero */
+
+/* Write down the packet that the last byte has completed: what the core has obeyed. */
+static void keep_journal(void)
+{
+    uint8_t i;
+
+    if (journal == NULL || !frame_ended) {
+        return;
+    }
+    for (i = 0u; i < frame_length; i++) {
+        fprintf(journal, "%02x", frame_body[i]);
+    }
+    fputs(frame_length > 0u ? "\n" : "", journal);
+    frame_length = 0u;
+    frame_ended = 0u;
+}
 
 /* ---- what the core asks for */
 
@@ -41,11 +60,13 @@ uint32_t hal_millis(void)
 
 uint8_t hal_receive(uint8_t *byte)
 {
+    keep_journal();
     if (received_first == received_end) {
         return 0u;
     }
     *byte = received[received_first];
     received_first++;
+    frame_ended = (uint8_t)(*byte == 0u);
     return 1u;
 }
 
@@ -113,6 +134,7 @@ static void pass(void)
 {
     if (!hanging) {
         board_pass();
+        keep_journal();
     }
     flush();
 }
@@ -212,8 +234,10 @@ static void run_in_step(void)
 static const char USAGE[] =
     "usage: polepilot-board --link PATH [--in-step] [--features BITS] [--hard-limits L,C,R]\n"
     "                       [--pan-ends LOW,HIGH] [--pan-falling] [--max-steering CENTIDEGREES]\n"
+    "                       [--journal FILE]\n"
     "The microcontroller as a program: PATH becomes a link to its serial line. It runs in real time\n"
-    "until it is ended, or with --in-step as far as standard input says (sim/steps.h).\n";
+    "until it is ended, or with --in-step as far as standard input says (sim/steps.h). FILE gets the body\n"
+    "of each packet that it obeyed.\n";
 
 static void misused(const char *option, const char *text, const char *expected)
 {
@@ -254,7 +278,8 @@ int main(int count, char **words)
         {"link", required_argument, NULL, 'l'},        {"in-step", no_argument, NULL, 's'},
         {"features", required_argument, NULL, 'f'},    {"hard-limits", required_argument, NULL, 'h'},
         {"pan-ends", required_argument, NULL, 'p'},    {"pan-falling", no_argument, NULL, 'd'},
-        {"max-steering", required_argument, NULL, 'm'}, {"help", no_argument, NULL, '?'},
+        {"max-steering", required_argument, NULL, 'm'}, {"journal", required_argument, NULL, 'j'},
+        {"help", no_argument, NULL, '?'},
         {NULL, 0, NULL, 0},
     };
     struct sigaction action = {.sa_handler = on_signal};
@@ -289,6 +314,13 @@ int main(int count, char **words)
         case 'm':
             numbers("max-steering", optarg, 9000u, value, 1);
             settings.max_steering = (int16_t)value[0];
+            break;
+        case 'j':
+            journal = fopen(optarg, "w");
+            if (journal == NULL) {
+                misused("journal", optarg, "a file that can be written");
+            }
+            (void)setvbuf(journal, NULL, _IOLBF, BUFSIZ);
             break;
         default:
             fputs(USAGE, stderr);

@@ -16,6 +16,7 @@ pytestmark = pytest.mark.browser
 
 BOUNDARY = [(0.0, 0.0), (6.0, 0.0), (6.0, 5.0), (0.0, 5.0)]
 ISLAND = [(2.6, 2.2), (3.4, 2.2), (3.4, 2.8), (2.6, 2.8)]
+NO_GO = [(5.2, 4.3), (5.7, 4.3), (5.7, 4.7), (5.2, 4.7)]
 LANDMARKS = [(0.0, 1.0), (0.0, 4.0), (3.0, 5.0), (6.0, 4.0), (6.0, 1.0), (3.0, 0.0)]
 ROUTE = [(1.6, 1.2), (4.4, 1.2), (4.6, 3.6)]
 
@@ -27,6 +28,7 @@ def draw_site(window: Window) -> None:
     window.draw("Draw boundary", BOUNDARY)
     window.draw("Draw island", ISLAND)
     window.draw("Draw wall", [(1.0, 3.4), (1.8, 3.4)])
+    window.draw("Draw no-go area", NO_GO)
     window.press("Place landmark")
     for x, y in LANDMARKS:
         window.click(x, y)
@@ -56,6 +58,7 @@ def test_draw_then_track_the_route(window: Window, service: Service) -> None:
     assert len(site["boundary"]) == 4
     assert len(site["islands"]) == 1
     assert len(site["walls"]) == 1
+    assert len(site["no_go"]) == 1
     assert len(site["landmarks"]) == len(LANDMARKS)
     last = site["routes"][0]["nodes"][-1]
     assert math.dist(last, ROUTE[-1]) < 0.1

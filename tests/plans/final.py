@@ -33,14 +33,21 @@ def campaign(
     jobs = [(name, radius) for radius in radii for name in maps]
     work = partial(_one, dev=dev)
     if processes == 1:
-        rows = [work(job) for job in jobs]
+        rows = [_said(work(job)) for job in jobs]
     else:
         with ProcessPoolExecutor(processes) as pool:
-            rows = list(pool.map(work, jobs))
+            rows = [_said(row) for row in pool.map(work, jobs)]
     return {
         f"{radius:g}": [row for row, job in zip(rows, jobs, strict=True) if job[1] == radius]
         for radius in radii
     }
+
+
+def _said(row: Row) -> Row:
+    """The row, with a word on standard error that it is there."""
+    short = row.get("error") or f"{row['coverage']:.3f} %, over {row['over']:.3f}"
+    sys.stderr.write(f"{row['map']}: {short}\n")
+    return row
 
 
 def planned(site: Row, radius: float, **options: Any) -> Row:

@@ -49,6 +49,8 @@ _GAP = 0.55
 """Tool widths between the two crossings from a loop to another and back."""
 _LEAST = 0.0065
 """Missed patches smaller than this share of the tool's square get no bump."""
+_SHARE = 0.00008
+"""Nor those smaller than this share of all that is to be swept."""
 _MANY = 60
 _SMALLEST = 0.008
 """Missed patches below this are left, m² for a tool of 0.4 m; scaled with its square."""
@@ -253,7 +255,14 @@ def _path(
         for _ in range(2):
             missed = target.difference(swept_shape(path, tool))
             path, parts = with_bumps(
-                path, parts, target, missed, space, tool, _LEAST * tool**2, options.order == "paper"
+                path,
+                parts,
+                target,
+                missed,
+                space,
+                tool,
+                min(_LEAST * tool**2, _SHARE * target.area),
+                options.order == "paper",
             )
         return path, np.ones(len(path) - 1, np.int8), parts
     return _driven_path(runs, space, options, target, notes)

@@ -41,3 +41,22 @@ def test_restoring_forgets_and_costs_count_changes_of_gear() -> None:
     assert np.array_equal(track.arrays()[0], before[0])
     assert track.pose == Pose2D(1.0, 0.0, 0.0)
     assert track.straight == 1.0
+
+
+def test_turned_round_the_same_curves_are_driven_tail_first() -> None:
+    track = Track(Pose2D(0.0, 0.0, 0.0), RADIUS)
+    saved = track.save()
+    track.turn_round()
+    track.append((("S", 1.0), ("L", RADIUS * math.pi / 2)))
+    points, gears = track.arrays()
+    assert points[1] == pytest.approx((-1.0, 0.0))
+    assert points[-1] == pytest.approx((-1.0 - RADIUS, -RADIUS))
+    assert (gears == -1).all()
+    assert not track.back_out(9.0)
+    points, gears = track.arrays()
+    assert points[-1] == pytest.approx((0.0, 0.0))
+    assert gears[-1] == 1
+    track.turn_round()
+    assert track.pose.heading == pytest.approx(0.0, abs=0.01)
+    track.restore(saved)
+    assert track.sign == 1

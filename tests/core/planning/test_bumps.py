@@ -1,0 +1,61 @@
+"""Bumps of a path: they sweep what it missed, lose nothing, and are short."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from core.planning import maps
+from shapely import MultiPolygon
+
+from polepilot.core.plan import PlanPart
+from polepilot.core.planning.bumps import with_bumps
+from polepilot.core.planning.options import PlanOptions
+from polepilot.core.planning.space import free_space
+from polepilot.core.planning.swept import swept_shape
+
+TOOL = 0.4
+
+
+def _bumped(path: list[list[float]], target: shapely.Polygon) -> tuple[np.ndarray, float, float]:
+    """The path with bumps, what it missed before of the target, and what it misses after, m²."""
+    space = free_space(maps.site(maps.box(-2, -2, 4, 4)), PlanOptions(min_turn_radius=0))
+    line, area = np.array(path, dtype=float), MultiPolygon([target])
+    missed = area.difference(swept_shape(line, TOOL))
+    parts = (PlanPart("loop", 0, 1), PlanPart("loop", 1, len(line) - 1))
+    points, moved = with_bumps(line, parts, area, missed, space, TOOL, 0.0005)
+    assert [part.kind for part in moved] == ["loop", "loop"]
+    assert moved[0].last == moved[1].first
+    assert moved[1].last == len(points) - 1
+    return points, missed.area, area.difference(swept_shape(points, TOOL)).area
+
+
+def test_the_tip_of_a_corner_is_reached() -> None:
+    # Outside of the corner the disc leaves a tip; the loop around would sweep the rest.
+    target = shapely.box(0, 0.1, 1.2, 2).union(shapely.box(0.9, 0.0, 1.2, 0.3))
+    path = [[1.0, 2.0], [1.0, 0.2], [0.2, 0.2]]
+    points, before, after = _bumped(path, target.intersection(shapely.box(0.8, 0, 1.2, 2)))
+    assert before > 0.005
+    assert after < 0.3 * before
+    assert _length(points) < _length(np.array(path)) + 0.2
+
+
+def test_a_strip_beside_a_leg_is_swept_by_stretches_that_step_aside() -> None:
+    target = shapely.box(0.3, -0.1, 2.7, 0.3)  # 10 cm more than the leg sweeps
+    path = [[0.0, 0.0], [0.05, 0.0], [3.0, 0.0]]
+    points, before, after = _bumped(path, target)
+    assert before == pytest.approx(0.24, abs=0.001)
+    assert after < 0.08 * before
+    # Along the strip and back would be twice its length, 4.8 m.
+    assert _length(points) - 3.0 < 0.8 * 2.4
+
+
+def test_nothing_missed_nothing_changed() -> None:
+    path = [[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]
+    points, before, after = _bumped(path, shapely.box(0.5, -0.1, 2.5, 0.1))
+    assert before == after == 0
+    assert np.array_equal(points, np.array(path))
+
+
+def _length(points: np.ndarray) -> float:
+    return float(np.hypot(*np.diff(points, axis=0).T).sum())

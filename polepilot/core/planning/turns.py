@@ -94,13 +94,16 @@ def _left_turns(turn: float, radius: float) -> tuple[Turn, ...]:
                 checks += [last * share * out for share in (0.25, 0.5, 0.75)]
             cut = 0.0
             if checks:
-                line = LineString(sample(start, curve, radius)[0])
+                driven = sample(start, curve, radius)[0]
+                if len(driven) < 2:
+                    continue  # shorter than anything that is driven
+                line = LineString(driven)
                 cut = float(np.max(shapely.distance(line, shapely.points(np.array(checks)))))
             whole: Curve = (*curve, ("S", -last)) if finish else curve
             stop = 0.0 if finish else last
             begin = Pose2D(0.0, 0.0, 0.0) if visit else start
-            driven = (("S", first), *whole) if visit else whole
-            points = sample(begin, joined(driven), radius)[0]
+            curve_here = (("S", first), *whole) if visit else whole
+            points = sample(begin, joined(curve_here), radius)[0]
             way = Turn(0.0, cut, first, visit, stop, joined(whole), points)
             cost = curve_cost(way.after(10.0)) - 10.0 - stop + 20 * min(cut, 0.5) ** 2
             ways.append(replace(way, cost=cost))

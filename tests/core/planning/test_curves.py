@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from polepilot.core.geometry import Pose2D, angle_between
 from polepilot.core.planning.curves import curve_length, gear_changes, sample, shortest_curves
+from polepilot.core.planning.turns import turns_round
 
 _pose = st.builds(Pose2D, st.floats(-4, 4), st.floats(-4, 4), st.floats(-math.pi + 1e-6, math.pi))
 
@@ -53,3 +54,11 @@ def test_samples_keep_the_radius() -> None:
     assert gears.tolist().count(-1) > 5
     steps = np.hypot(*np.diff(points, axis=0).T)
     assert steps[:-1].max() <= 0.6 * math.radians(5.01)
+
+
+@pytest.mark.parametrize("turn", [1e-6, 2e-6, 1e-5, 1e-4])
+def test_the_least_of_turns_has_a_way(turn: float) -> None:
+    for side in (turn, -turn):
+        ways = turns_round(side, 0.6)
+        assert ways
+        assert [way.cost for way in ways] == sorted(way.cost for way in ways)

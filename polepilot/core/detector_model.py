@@ -1,8 +1,8 @@
 """What the detector can read, and how well: one model for the simulator and for predictions.
 
 The sigmas are those of the detector on pictures of two other programs, with photographs behind the
-landmarks (docs/results: 95 % of the errors are within two of them). In plain rooms it is half as
-far off.
+landmarks (docs/results: 95 % of the errors are within two of them). In plain rooms it is about
+two thirds as far off.
 
 Formulas take numbers or numpy arrays alike. Distances are horizontal, from the pan axis to the
 landmark's axis; a bearing is measured from the optical axis, and its cosine is what counts here.
@@ -23,9 +23,9 @@ FARTHEST = 16.0
 """The detector reads a 65 cm landmark no farther away than this, metres; others in proportion."""
 NEAREST = 0.2
 """Nothing nearer than this is a landmark in front of the camera, metres."""
-RANGE_SHARE = 0.0015
+RANGE_SHARE = 0.0005
 """Range error that does not depend on the distance, as a share of the range."""
-EDGE_PIXELS = 0.12
+EDGE_PIXELS = 0.15
 """Error of the code's length in the picture, pixels."""
 BEARING_SIGMA = math.radians(0.04)
 DROP_OUT = 0.03

@@ -29,11 +29,11 @@ def measured(pictures: str) -> dict[str, dict[str, Any]]:
 
 @pytest.mark.parametrize(
     ("pictures", "least", "most"),
-    [("photo", 0.65, 1.45), ("clean", 0.35, 1.1), ("clean-8-12", 0.5, 1.1), ("pan", 0.4, 1.1)],
+    [("photo", 0.65, 1.45), ("pan", 0.5, 1.45), ("clean", 0.4, 1.1), ("clean-8-12", 0.5, 1.1)],
 )
 def test_errors_are_those_of_the_detector(pictures: str, least: float, most: float) -> None:
-    """Half of what 95 % of the errors stay below is a standard deviation. With photographs it is
-    the model's; in plain rooms the model is cautious."""
+    """Half of what 95 % of the errors stay below is a standard deviation. With photographs and
+    while panning it is the model's; in plain rooms the model is cautious."""
     for place, figures in measured(pictures).items():
         near, far = map(float, place.split()[1].split("-"))
         away = 0.5 * (near + far)

@@ -131,8 +131,9 @@ def cut(
     with_flap = room - overlap
     columns = max(1, math.ceil(surface.width / with_flap - _TINY))
     if columns > 1 and not surface.closed and surface.width <= room + (columns - 2) * with_flap:
-        columns -= 1  # the last one needs no flap
-    width = surface.width / columns
+        columns -= 1  # the last one needs no flap, and may be wider for that
+    width = min(surface.width / columns, with_flap)
+    last = surface.width - (columns - 1) * width
 
     def tallest(first: bool, last: bool) -> float:
         above, below = COLLAR if first else overlap, FOOT if last else BELOW_SEAM
@@ -141,7 +142,7 @@ def cut(
     tops = seams(surface, tallest)
     for row, (top, bottom) in enumerate(zip(tops, (*tops[1:], surface.height), strict=True)):
         for column in range(columns):
-            size = (column * width, top, width, bottom - top)
+            size = (column * width, top, last if column == columns - 1 else width, bottom - top)
             yield row, len(tops), column, columns, *size
 
 

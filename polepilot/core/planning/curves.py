@@ -80,7 +80,8 @@ def sample(
     gears: list[NDArray[np.int8]] = []
     for piece in curve:
         kind, length = piece
-        if abs(length) < 1e-6:
+        if abs(length) < 1e-6:  # no point of its own, but what it turns tells a metre on
+            pose = drive(pose, piece, radius)
             continue
         if kind == "S":
             count = 1

@@ -16,7 +16,7 @@ from polepilot.core.link.usb import SerialPort
 from polepilot.core.robot.eye import Eye
 from polepilot.core.robot.ports import CameraPort, Clock
 from polepilot.core.robot.robot import Robot
-from polepilot.core.sim.board import BoardSettings
+from polepilot.core.sim.board_pins import BoardSettings
 from polepilot.core.sim.board_process import BoardProcess
 from polepilot.core.sim.clock import PacedClock
 from polepilot.core.sim.obstacle import Obstacle

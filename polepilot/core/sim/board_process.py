@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import IO
 
 from polepilot.core.errors import LinkError
-from polepilot.core.sim.board import BoardInputs, BoardOutputs, BoardSettings
+from polepilot.core.sim.board_pins import BoardInputs, BoardOutputs, BoardSettings
 
 LINK = "{link}"
 """Stands in a command for the path at which the program puts its serial line."""

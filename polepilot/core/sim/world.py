@@ -19,7 +19,8 @@ from polepilot.core.landmark import LandmarkKind
 from polepilot.core.observation import Frame
 from polepilot.core.robot.ports import Chunk, Sighting
 from polepilot.core.scenery import Disc, Scenery
-from polepilot.core.sim.board import Board, BoardInputs, BoardSettings
+from polepilot.core.sim.board import Board
+from polepilot.core.sim.board_pins import BoardInputs, BoardSettings
 from polepilot.core.sim.board_process import BoardProcess
 from polepilot.core.sim.motion import Actuation, Disturbances, Motion
 from polepilot.core.sim.obstacle import Obstacle

@@ -9,6 +9,7 @@ may run at any speed.
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
@@ -376,6 +377,64 @@ class Conformance:
         assert duties == sorted(duties, reverse=True)
         assert len([duty for duty in duties if -1000 < duty < 1000]) >= 3, "too sudden"
 
+    def test_a_motor_is_reversed_only_when_it_has_nearly_stopped(self, bench: Bench) -> None:
+        """A motor that follows its duty with 80 ms of lag turns by less than a fifth of its full
+        speed when the supply is reversed, and no more than 0.2 s are lost by that."""
+        bench.armed().drive(1000, -1000, 0, 1.2)
+        start = then = bench.time_ms()
+        speeds = [1.0, -1.0]
+        turned: list[int | None] = [None, None]
+        while then - start < 1000:
+            bench.send(Drive(-1000, 1000, 0))
+            for message in bench.collect(0.02):
+                if not isinstance(message, Telemetry):
+                    continue
+                share = -math.expm1(-(message.t_ms - then) / 80)
+                then = message.t_ms
+                for side, duty in enumerate(message.duty):
+                    speeds[side] += share * (duty / 1000 - speeds[side])
+                    if duty * (-1, 1)[side] > 0 and turned[side] is None:
+                        turned[side] = then
+                        assert abs(speeds[side]) < 0.2, "plugged"
+        for at in turned:
+            assert at is not None, "never reversed"
+            # The ramp down takes a second at most by the rule for slew limits.
+            assert at - start <= 1000 + 200 + SLACK_MS
+        assert bench.drive(-1000, 1000, 0, 0.4).duty == (-1000, 1000)
+
+    def test_nor_is_it_after_a_stop(self, bench: Bench) -> None:
+        """A stop takes the duty away at once; the wheels roll on for a while."""
+        bench.armed().drive(1000, 1000, 0, 1.2)
+        start = bench.time_ms()
+        bench.ask(Estop())
+        bench.ask(Clear())
+        assert bench.ask(Arm()).state is BoardState.ARMED
+        seen = []
+        for _ in range(20):
+            bench.send(Drive(-1000, -1000, 0))
+            seen += [m for m in bench.collect(0.02) if isinstance(m, Telemetry)]
+        backward = [m.t_ms - start for m in seen if m.duty[0] < 0]
+        assert backward, "never reversed"
+        assert 100 <= backward[0] <= 200 + 2 * SLACK_MS
+
+    def test_the_servo_turns_gradually(self, bench: Bench) -> None:
+        """At most 400 degrees per second, and at the far end within a third of a second."""
+        bench.armed()
+        for wanted in (4000, -4000):
+            before = bench.drive(0, 0, -wanted, 0.4)
+            assert before.steering == -wanted
+            start, last = bench.time_ms(), before
+            seen = []
+            while not seen or seen[-1].t_ms - start < 340:
+                bench.send(Drive(0, 0, wanted))
+                seen += [m for m in bench.collect(0.02) if isinstance(m, Telemetry)]
+            for message in seen:
+                # One millisecond more: time is cut to whole ones.
+                reach = 40 * (message.t_ms - last.t_ms + 1)
+                assert abs(message.steering - last.steering) <= reach, "too sudden"
+                last = message
+            assert last.steering == wanted
+
     # ---- emergency stop
 
     def test_estop_stops_at_once_and_is_latched(self, bench: Bench) -> None:
@@ -518,6 +577,23 @@ class PinConformance:
         assert port.pan_output() < 0
         bench.collect(0.3)
         assert port.pan_output() == 0, "a silent link"
+
+    def test_the_pan_motor_is_not_plugged(self, bench: Bench, port: PinPort) -> None:
+        bench.hello()
+        for adc in (500, 510, 520, 530):
+            port.set_pins(pan_adc=adc)
+            assert bench.ask(Pan(1000)).status is AckStatus.OK
+            bench.collect(0.1)
+        assert port.pan_output() == 1000
+        start = bench.time_ms()
+        bench.ask(Pan(-1000))
+        outputs = [port.pan_output()]
+        while bench.time_ms() - start < 150:
+            outputs.append(port.pan_output())
+        assert min(outputs) >= 0, "a reversed supply on a motor that turns"
+        bench.ask(Pan(-1000))
+        bench.collect(0.24)
+        assert port.pan_output() < 0
 
     def test_pan_stops_at_its_ends(self, bench: Bench, port: PinPort) -> None:
         assert Features.PAN in bench.hello().features

@@ -185,12 +185,14 @@ def test_pan_ends_follow_the_potentiometer() -> None:
     bench.ask(Pan(500))
     assert port.pan_output() == 0, "left is where the counts fall"
     bench.ask(Pan(-500))
+    bench.collect(0.1)
     assert port.pan_output() == -500
 
 
-def test_a_slew_limit_slower_than_the_rule_is_refused() -> None:
-    with pytest.raises(InternalError, match="at least 1000"):
-        BoardSettings(slew=999)
+@pytest.mark.parametrize("name", ["duty_slew", "pan_slew", "steering_slew"])
+def test_a_slew_limit_slower_than_the_rule_is_refused(name: str) -> None:
+    with pytest.raises(InternalError, match=f"{name} is 0 a millisecond, at least 1"):
+        BoardSettings(**{name: 0})
 
 
 MESSAGES = st.one_of(

@@ -10,7 +10,7 @@ from polepilot.core.landmark import LandmarkKind
 from polepilot.core.observation import Detection, Image
 from polepilot.core.vehicle import Camera
 from polepilot.core.vision.kernel import REASONS, Kernel, Strip
-from polepilot.core.vision.measure import measure, pitch_of, stands, through_pinhole
+from polepilot.core.vision.measure import is_cut, measure, pitch_of, stands, through_pinhole
 from polepilot.core.vision.paint import ORANGE, Paint
 
 OUT_OF_PLACE = "not where a landmark can be"
@@ -87,7 +87,7 @@ class LandmarkDetector:
     def detect(self, image: Image) -> list[Detection]:
         """All landmarks of a picture (rows x columns x 3 BGR, or grey), from left to right."""
         read = [self._reading(strip) for strip in self._kernel.look(image) if not strip.reason]
-        best = _best([one for one in read if stands(one.ideal, one.kind, self._camera)])
+        best = _best([one for one in read if self._stands(one)])
         return [found.detection for found in self._measured(best)]
 
     def examine(self, image: Image) -> Look:
@@ -99,7 +99,7 @@ class LandmarkDetector:
                 rejected.append(Rejected(strip, REASONS[strip.reason]))
                 continue
             one = self._reading(strip)
-            if stands(one.ideal, one.kind, self._camera):
+            if self._stands(one):
                 standing.append(one)
             else:
                 rejected.append(Rejected(strip, OUT_OF_PLACE))
@@ -115,6 +115,10 @@ class LandmarkDetector:
         kind = self._kinds[strip.id]
         ideal = through_pinhole(strip, kind, self._camera) if self._bent else strip
         return _Reading(strip, ideal, kind)
+
+    def _stands(self, one: _Reading) -> bool:
+        cut = is_cut(one.seen, one.kind, self._camera)
+        return stands(one.ideal, one.kind, self._camera, cut)
 
     def _measured(self, best: Sequence[_Reading]) -> list[Found]:
         if not best:

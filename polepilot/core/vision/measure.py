@@ -114,16 +114,26 @@ def pitch_of(strips: Sequence[tuple[Strip, LandmarkKind]], camera: Camera) -> Pi
     return Pitch(total / weight, 1 / math.sqrt(weight))
 
 
-def stands(strip: Strip, kind: LandmarkKind, camera: Camera) -> bool:
+def is_cut(strip: Strip, kind: LandmarkKind, camera: Camera) -> bool:
+    """Whether more than half of an end bar lies above or below the picture."""
+    inner = kind.segments / 2 - 1
+    top = strip.row - strip.unit * inner / (1 - strip.sag * inner)
+    bottom = strip.row + strip.unit * inner / (1 + strip.sag * inner)
+    return top < -0.5 or bottom > camera.height - 0.5
+
+
+def stands(strip: Strip, kind: LandmarkKind, camera: Camera, cut: bool = False) -> bool:
     """Whether a strip is where a landmark can be: not under the floor, nor out of a hand's reach.
 
     Far stripes of other things are told from landmarks by this more than by anything else.
+    Of one that the picture has ``cut`` less is seen, so it has to stand on the floor.
     """
     depth = depth_of(kind.segment, strip.unit, camera.constant)
     seen = math.atan2(camera.center_y - strip.row, camera.constant)
     lowest = depth * math.tan(min(seen + LEVEL, 1.5)) + camera.mount_height
     highest = depth * math.tan(max(seen - LEVEL, -1.5)) + camera.mount_height
-    return lowest > -0.1 * kind.height and highest < HIGHEST + kind.height / 2
+    most = kind.height / 2 + 3 * FOOT_SIGMA if cut else HIGHEST + kind.height / 2
+    return lowest > -0.1 * kind.height and highest < most
 
 
 def through_pinhole(strip: Strip, kind: LandmarkKind, camera: Camera) -> Strip:
@@ -138,6 +148,9 @@ def through_pinhole(strip: Strip, kind: LandmarkKind, camera: Camera) -> Strip:
     # The outer edges, often hardly a step against what is behind, count for little in the kernel.
     places = np.array([k for k in range(1, kind.segments) if code[k] != code[k - 1]]) - half
     rows = strip.unit * places / (1 + strip.sag * places)
+    # Beyond the picture nothing was seen, and what is known of the lens need not hold.
+    seen = (strip.row + rows > -0.5) & (strip.row + rows < camera.height - 0.5)
+    places, rows = places[seen], rows[seen]
     line = np.column_stack([strip.column + strip.lean * rows, strip.row + rows])
     sides = [(strip.column + side, strip.row) for side in (-0.5, 0.5)]
     points = undistort(np.vstack([line, sides]), camera)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -174,6 +175,74 @@ def test_tape_a_little_wider_than_the_pole_is_not_taken_for_paint(lighter: int) 
         rows = slice(round(upper), round(lower))
         taped[rows, round(one.column - half) : round(one.column + half) + 1] = black + lighter
         assert ALL.detect(taped) == [], segment
+
+
+def cut(image: Image, first: int, end: int, lower: float = 0.0) -> list[Detection]:
+    """What is seen in these rows of a picture, all that a camera shows; ``lower``: by how many rows
+    its axis is thought to be lower."""
+    center = CAMERA.center_y - first + lower
+    camera = replace(CAMERA, height=end - first, center_y=center)
+    detector = LandmarkDetector(camera, dict.fromkeys(range(1, 16), LandmarkKind()))
+    return detector.detect(np.ascontiguousarray(image[first:end]))
+
+
+def test_near_landmarks_whose_lower_bar_is_out_of_the_picture() -> None:
+    ratios, errors, turned = [], [], []
+    number = 0
+    for away in (1.28, 1.33, 1.38, 1.43, 1.48, 1.53):
+        for bearing in (-0.24, -0.1, 0.0, 0.17):
+            number = number % 15 + 1
+            one = only(picture([pole(number, away, bearing)], seed=number))
+            assert one.id == number
+            assert one.bottom > CAMERA.height + 0.4 * (one.bottom - one.top) / 13
+            errors.append(abs(one.range / away - 1))
+            ratios.append((one.range - away) / one.range_sigma)
+            turned.append((one.bearing - bearing) / one.bearing_sigma)
+    assert np.mean(errors) <= 0.0015
+    assert np.max(errors) <= 0.01
+    assert np.sqrt(np.mean(np.square(ratios))) < 1.25
+    assert np.sqrt(np.mean(np.square(turned))) < 1.25
+
+
+@pytest.mark.parametrize("number", [1, 8, 6, 13])
+def test_how_much_of_a_landmark_has_to_be_in_the_picture(number: int) -> None:
+    away = 2.2
+    image = picture([pole(number, away, 0.1)], number)
+    one = only(image)
+    unit = (one.bottom - one.top) / 13
+
+    def seen(above: float, below: float) -> list[Detection]:
+        """With so many segments out of the picture at either end."""
+        return cut(image, round(one.top + above * unit), round(one.bottom - below * unit) + 1)
+
+    for above, below in ((0.0, 1.0), (0.0, 2.0), (1.0, 0.0), (2.0, 0.0), (1.3, 1.3), (2.0, 1.2)):
+        (found,) = seen(above, below)
+        assert found.id == number, (above, below)
+        assert found.range == pytest.approx(away, abs=3 * found.range_sigma)
+        assert found.range == pytest.approx(away, rel=0.01)
+        assert found.bearing == pytest.approx(0.1, abs=3 * found.bearing_sigma)
+    for above, below in ((2.0, 2.0), (0.0, 3.0), (3.0, 0.0), (0.0, 4.5), (4.5, 0.0)):
+        assert seen(above, below) == [], (above, below)
+
+
+def test_a_landmark_without_an_end_bar_stands_on_the_floor() -> None:
+    image = picture([pole(13, 3.0, 0.0)])
+    one = only(image)
+    first = round(one.top + 2 * (one.bottom - one.top) / 13)
+    assert [found.id for found in cut(image, first, 300)] == [13]
+    assert cut(image, first, 300, lower=80) == [], "40 cm above the floor"
+    assert [found.id for found in cut(image, first - 20, 300, lower=80)] == [13], "all is seen"
+
+
+def test_a_covered_segment_is_not_guessed_where_a_bar_is_out_of_the_picture() -> None:
+    image = picture([pole(13, 1.3, 0.0)])
+    one = only(image)
+    unit = (one.bottom - one.top) / 13
+    for segment in range(11):
+        first = round(one.top + segment * unit)
+        covered = image.copy()
+        covered[first : round(first + unit), 170:230] = (150, 150, 150)
+        assert ALL.detect(covered) == [], segment
 
 
 def post(

@@ -102,7 +102,7 @@ static int is_known(const eye_hits *hits, int known, int x, int from, int end)
 {
     for (const eye_hit *h = hits->hits + known; h < hits->hits + hits->n_hits; h++) {
         float unit = (h->bottom - h->top) / (float)(2 * h->bits + 1);
-        if (unit > NEAR && fabsf(h->column - (float)x) < ABOUT * unit &&
+        if (unit > NEAR && !h->cut && fabsf(h->column - (float)x) < ABOUT * unit &&
             (float)from > h->top - ABOUT * unit && (float)end < h->bottom + ABOUT * unit)
             return 1;
     }

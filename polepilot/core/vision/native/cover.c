@@ -80,6 +80,8 @@ int eye_covered(const eye_picture *p, const eye_upright *u, const eye_scale *sca
                 double row = scale->middle + scale->unit * place;
                 double column = side->column + u->lean * (row - u->row) + sign * gap;
                 double light[3], most = 0, unlike = 0;
+                if (row < 0 || row > p->rows - 1) /* out of the picture */
+                    continue;
                 if (!beside(p, row, 0.2 * scale->unit, column, sign * apart, light))
                     return 0;
                 for (int c = 0; c < p->channels; c++) {

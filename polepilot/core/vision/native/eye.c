@@ -93,7 +93,7 @@ static int read_strip(const eye_task *task, const eye_candidate *candidate,
         return reason;
     note_scale(scale, thick, out);
     eye_take_leak(upright, scale->leak);
-    if (!eye_segment_levels(upright, scale, segments, levels))
+    if (!eye_segment_levels(upright, scale, code, segments, levels))
         return EYE_NO_SCALE;
     double noise = scale->noise / sqrt(scale->unit > 1 ? scale->unit : 1);
     reason = eye_read(task, levels, segments, upright->channels, noise, out->width,
@@ -134,6 +134,26 @@ static int read_candidate(const eye_picture *picture, const eye_task *task,
     return EYE_READ;
 }
 
+/* Whether more than half of an end bar is out of the picture. */
+static int lacks_bar(const eye_picture *p, const eye_scale *scale, int segments)
+{
+    double inner = segments / 2.0 - 1, sag = scale->sag * inner;
+    return scale->middle - scale->unit * inner / (1 - sag) < -0.5 ||
+           scale->middle + scale->unit * inner / (1 + sag) > p->rows - 0.5;
+}
+
+/* Whether both sides of a strip are in the picture as far down and up as its rows are. */
+static int shows_sides(const eye_picture *p, const eye_upright *u, const eye_side *side)
+{
+    double rows[2] = {u->first, u->first + u->rows * u->bin};
+    for (int end = 0; end < 2; end++) {
+        double middle = side->column + u->lean * (rows[end] - u->row);
+        if (middle - side->half < -0.5 || middle + side->half > p->columns - 0.5)
+            return 0;
+    }
+    return 1;
+}
+
 /* Looks closely at a candidate; the reason where it is no landmark. */
 static int examine(const eye_picture *picture, const eye_task *task,
                    const eye_candidate *candidate, int sharp, eye_strip *out)
@@ -164,6 +184,9 @@ static int examine(const eye_picture *picture, const eye_task *task,
     reason = eye_fit_side(picture, &upright, half, kind->flat, &side);
     if (reason != EYE_READ)
         return reason;
+    /* Its lean is uncertain enough without half of a side. */
+    if (lacks_bar(picture, &scale, segments) && !shows_sides(picture, &upright, &side))
+        return EYE_CUT_OFF;
     if (candidate->open_top || candidate->open_bottom)
         reason = eye_look_at_ends(picture, &upright, &scale, &side, candidate, out->code, levels,
                                   segments, &doubt);
@@ -181,7 +204,9 @@ static int examine(const eye_picture *picture, const eye_task *task,
     out->front = side.front;
     out->unit_sigma = scale.unit_sigma;
     out->sag_sigma = scale.sag_sigma;
-    out->column_sigma = side.sigma;
+    /* The bearing is that of the middle row, and the lean has to tell where the strip is there. */
+    double away = picture->rows / 2.0 - upright.bright_row;
+    out->column_sigma = hypot(side.sigma, upright.lean_sigma * away);
     double off = misfit(out, task->constant), most = most_misfit(out);
     if (!(off <= most)) /* or no number */
         return EYE_POOR_FIT;

@@ -35,6 +35,8 @@ typedef struct {
     double across_first;             /* middle of entry 0 */
     float across[EYE_MOST_COLUMNS];  /* bright minus dark by column */
     double half_window;              /* half the columns that the profile averages */
+    double bright_row;               /* middle of the bright segments that tell the lean, */
+    double lean_sigma;               /* whose deviation is known if the picture cuts off a bar */
 } eye_upright;
 
 /* A code's place and size along the strip. */
@@ -65,8 +67,8 @@ int eye_fit_scale(const eye_upright *upright, const eye_task *task, const char *
 void eye_refine_scale(const eye_upright *upright, const eye_task *task, const char *code,
                       const eye_candidate *candidate, eye_scale *scale);
 void eye_take_leak(eye_upright *upright, double leak);
-int eye_segment_levels(const eye_upright *upright, const eye_scale *scale, int segments,
-                       double levels[][3]);
+int eye_segment_levels(const eye_upright *upright, const eye_scale *scale, const char *code,
+                       int segments, double levels[][3]);
 int eye_read(const eye_task *task, double levels[][3], int segments, int channels, double noise,
              double width, int open, char *code, double *tint);
 int eye_fit_side(const eye_picture *picture, const eye_upright *upright, double half, int flat,

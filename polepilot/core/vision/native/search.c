@@ -72,10 +72,10 @@ static void look_at(eye_hits *hits, const uint8_t *signal, int first, int last, 
 {
     eye_run runs[EYE_MOST_RUNS], smooth[EYE_MOST_RUNS];
     int n = eye_find_runs(signal, hits->picture->rows, runs), known = hits->n_hits;
-    if (n >= 3) {
+    if (n >= 2) { /* a bar and a bit, the other bar out of the picture */
         eye_match_runs(hits, runs, n, (float)x);
         int left = eye_smooth_runs(runs, n, smooth);
-        if (left < n && left >= 3)
+        if (left < n && left >= 2)
             eye_match_runs(hits, smooth, left, (float)x);
     }
     if (eye_is_coloured(hits->picture->channels, hits->task))

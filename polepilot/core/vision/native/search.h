@@ -26,6 +26,7 @@ typedef struct {
     float column, top, bottom; /* the inner part: between the end bars */
     int16_t bits, id;
     int8_t open_top, open_bottom; /* an end bar's end is not to be seen */
+    int8_t cut;                   /* hardly anything of an end bar is in the picture */
     uint8_t contrast;             /* of the dimmest bright segment and the brightest dark one */
 } eye_hit;
 

@@ -23,6 +23,7 @@
 #define ROWS_A_UNIT 5.0 /* and how many are kept if there are many more */
 #define THIN 3.0        /* half of the columns looked at: nothing is blurred into the midst of more */
 #define OUTSIDE 3       /* columns at either end that say what is beside the strip */
+#define LEAN_NOISE 0.0065 /* of the width: how far off the lean has the bright segments */
 #define BESIDE 2.0      /* columns from the strip's side to what is beside it */
 
 /* The rows of one run of the code, averaged. */
@@ -173,29 +174,48 @@ static double find_lean(const band *bands, int n, int columns, int step, double 
     return best_lean;
 }
 
-/* Rows well inside every run of the code, as bands with the weights of bright - dark. */
+/* Rows well inside every run of the code that is in the picture, as bands with the weights of
+ * bright - dark. */
 static int fill_bands(const eye_picture *p, const eye_task *task, const eye_candidate *c,
                       const char *code, int segments, double unit, int first, int step,
                       int columns, int sharp, band *bands)
 {
     /* Kept off the edges, but for the middle row at least. */
     double trim = eye_limit(0.5 * unit - 0.52, 0, 0.2 * unit + 0.6);
-    int n = 0, ones = 0;
+    int n = 0, bright_weight = 0, darks = 0;
     for (int i = 1; i < segments - 1;) {
         int end = i;
         while (end < segments - 1 && code[end] == code[i])
             end++;
         int bright = code[i] == '1', bar = i == 1 || end == segments - 1;
-        double from = c->top + (i - 2) * unit, to = c->top + (end - 2) * unit;
-        fill_band(p, task, from + trim, to - trim, first, step, columns, sharp, bands + n);
-        bands[n].weight = bright ? (bar ? 1 : 2) : -2;
-        ones += bright && !bar;
-        n++;
+        double from = c->top + (i - 2) * unit + trim, to = c->top + (end - 2) * unit - trim;
+        int weight = bright ? (bar ? 1 : 2) : 0;
         i = end;
+        if (bar && (to < 0 || from > p->rows - 1)) /* out of the picture */
+            continue;
+        fill_band(p, task, from, to, first, step, columns, sharp, bands + n);
+        bands[n++].weight = weight;
+        bright_weight += weight;
+        darks += !bright;
     }
     for (int i = 0; i < n; i++)
-        bands[i].weight /= 2 * ones + 2;
+        bands[i].weight = bands[i].weight > 0 ? bands[i].weight / bright_weight : -1.0 / darks;
     return n;
+}
+
+/* How certain a lean is: the farther apart the bright segments, the more. The whole code has its bars
+ * for that, and what else is wrong with its lean is more. */
+static void know_lean(const band *bands, int n, int whole, double wide, eye_upright *out)
+{
+    double mean = 0, square = 0;
+    for (int i = 0; i < n; i++)
+        mean += bands[i].weight > 0 ? bands[i].weight * bands[i].row : 0;
+    for (int i = 0; i < n; i++)
+        square += bands[i].weight > 0
+                      ? bands[i].weight * (bands[i].row - mean) * (bands[i].row - mean)
+                      : 0;
+    out->bright_row = mean;
+    out->lean_sigma = whole ? 0 : LEAN_NOISE * wide / sqrt(square + 1);
 }
 
 /* How much of a column at ``offset`` from the strip's middle takes part in the profile. */
@@ -320,6 +340,7 @@ int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candida
     columns = columns > EYE_MOST_COLUMNS ? EYE_MOST_COLUMNS : columns;
     band bands[2 * EYE_MOST_BITS + 4];
     int n = fill_bands(p, task, c, code, segments, unit, first, step, columns, sharp, bands);
+    know_lean(bands, n, bands[0].weight > 0 && bands[n - 1].weight > 0, wide, out);
     double across_first = first + (step - 1) / 2.0;
     cap_signal(bands, n, columns, (int)lround((c->column - across_first) / step));
     double lean = find_lean(bands, n, columns, step, row, length, wide > 2 ? wide : 2, sharp);

@@ -11,6 +11,7 @@
 #define SHOWS 5.0        /* times the blur: a boundary does not show farther away */
 #define MOST_SHIFT 1.2   /* half codes from the middle: light does not go on changing beyond */
 #define LEVEL_RIDGE 2e-3 /* rows of nothing: hold the levels that no row shows */
+#define SEEN 0.3         /* share of a segment that lies in the picture if it is seen */
 
 /* A step, and how it changes with its place and blur. */
 typedef struct {
@@ -140,10 +141,39 @@ void eye_take_leak(eye_upright *u, double leak)
     }
 }
 
+/* Gives segments of end bars that are out of the picture the light of their bar's other segment,
+ * without that the mean light of the bright bits; 0 where any other one is out of the picture, or
+ * both bars. */
+static int stand_in(const int *seen, const char *code, int segments, double levels[][3])
+{
+    double bits[3] = {0};
+    int ones = 0, bars = 0;
+    for (int i = 2; i < segments - 2; i++) {
+        if (!seen[i])
+            return 0;
+        if (code[i] == '0')
+            continue;
+        for (int c = 0; c < 3; c++)
+            bits[c] += levels[i][c];
+        ones++;
+    }
+    for (int c = 0; c < 3; c++)
+        bits[c] /= ones > 0 ? ones : 1;
+    for (int bar = 0; bar < 2; bar++) {
+        int outer = bar ? segments - 1 : 0, inner = bar ? segments - 2 : 1;
+        if (!seen[inner])
+            memcpy(levels[inner], seen[outer] ? levels[outer] : bits, sizeof bits);
+        if (!seen[outer])
+            memcpy(levels[outer], levels[inner], sizeof bits);
+        bars += seen[inner] || seen[outer];
+    }
+    return bars > 0;
+}
+
 /* Light of every segment with its neighbours' blur taken out, per channel; 0 where it cannot be
  * told. */
-int eye_segment_levels(const eye_upright *u, const eye_scale *scale, int segments,
-                       double levels[][3])
+int eye_segment_levels(const eye_upright *u, const eye_scale *scale, const char *code,
+                       int segments, double levels[][3])
 {
     enum { MOST = EYE_MOST_SEGMENTS + 2 };
     double matrix[MOST * MOST] = {0}, right[MOST * 3] = {0};
@@ -184,7 +214,12 @@ int eye_segment_levels(const eye_upright *u, const eye_scale *scale, int segment
         matrix[a * n + a] += LEVEL_RIDGE;
     if (!eye_solve(matrix, right, n, 3))
         return 0;
-    for (int i = 0; i < segments; i++)
+    double begin = u->first, end = u->first + u->rows * u->bin;
+    int seen[EYE_MOST_SEGMENTS];
+    for (int i = 0; i < segments; i++) {
         memcpy(levels[i], right + (i + 1) * 3, sizeof levels[i]);
-    return 1;
+        seen[i] = fmin(place[i + 1], end) - fmax(place[i], begin) >=
+                  SEEN * (place[i + 1] - place[i]);
+    }
+    return stand_in(seen, code, segments, levels);
 }

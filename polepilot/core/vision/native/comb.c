@@ -16,7 +16,7 @@
 #define NEAR 3.3f          /* rows per segment from which on runs tell, */
 #define SHARP 5.5f         /* and from which on blurred colour does */
 #define ABOUT 3            /* segments about a near code whose colour is its own */
-#define FRAYED 8           /* rows by which a code may be shorter than its stretch of colour, */
+#define FRAYED 11          /* rows by which a code may be shorter than its stretch of colour, */
 #define HIDDEN 2           /* and by which it may be longer */
 #define ROWS_APART 3       /* every third row is asked for faint colour */
 #define LEAST_DEPTH 5.0f   /* grey levels of a valley */
@@ -131,8 +131,7 @@ void eye_match_comb(eye_hits *hits, const uint8_t *signal, int first, int last, 
         int top = from < BESIDE ? 0 : from - BESIDE;
         int bottom = end + BESIDE + 1 < rows ? end + BESIDE + 1 : rows;
         sum_signal(signal, top, bottom, sum);
-        if (match_stretch(hits, sum, top, bottom, from, end, height + HIDDEN, x))
-            continue;
+        match_stretch(hits, sum, top, bottom, from, end, height + HIDDEN, x);
         sum_brightness(hits, x, top, bottom, sum);
         match_stretch(hits, sum, top, bottom, from, end, height + HIDDEN, x);
     }

@@ -40,7 +40,7 @@ static int beside(const eye_picture *p, double row, double reach, double column,
 }
 
 /* The middle one of the dark segments' levels: the paint, even if some of them are covered. */
-static double median_dark(double levels[][3], const char *code, int segments, int channel)
+static double median_dark(double levels[][EYE_LIGHTS], const char *code, int segments, int channel)
 {
     double values[EYE_MOST_SEGMENTS];
     int n = 0;
@@ -57,7 +57,7 @@ static double median_dark(double levels[][3], const char *code, int segments, in
 
 /* Whether a bit that reads dark may be something else in front of it. */
 int eye_covered(const eye_picture *p, const eye_upright *u, const eye_scale *scale,
-                const eye_side *side, const char *code, double levels[][3], int segments,
+                const eye_side *side, const char *code, double levels[][EYE_LIGHTS], int segments,
                 double noise)
 {
     double contrast = 0, black[3];

@@ -183,7 +183,7 @@ static int look_at_bar(const view *v, const across *bits, double contrast, doubl
  * much more a bar leaves over as paint than as what is behind it. */
 int eye_look_at_ends(const eye_picture *p, const eye_upright *u, const eye_scale *scale,
                      const eye_side *side, const eye_candidate *candidate, const char *code,
-                     double levels[][3], int segments, double *doubt)
+                     double levels[][EYE_LIGHTS], int segments, double *doubt)
 {
     view v = {.picture = p, .scale = scale, .column = side->column, .row = u->row,
               .lean = u->lean, .half = side->half};

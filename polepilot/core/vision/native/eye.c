@@ -11,7 +11,8 @@
 #define USUAL_SIDE_NOISE 0.08  /* rms rest of the fit across, of its peak */
 #define USUAL_PITCH 0.035      /* radians between camera and pole */
 #define USUAL_BEND 2.1          /* times what the sag's sigma and that pitch allow */
-#define USUAL_TINT 0.17        /* as in eye_strip */
+#define USUAL_TINT 0.17        /* as in eye_strip, */
+#define USUAL_SHARP_TINT 0.28  /* and where colour is blurred: beside the strip and between its segments */
 #define USUAL_SIGMA 0.0040      /* of the unit, as a share of it */
 #define USUAL_DOUBT 1.5         /* rest of an end bar as paint, over its rest as what is behind it */
 #define SURE 6e-4              /* share of the unit: no second fit makes it better */
@@ -47,11 +48,11 @@ static double half_width(const eye_task *task, const eye_kind *kind, double unit
 /* How badly everything together fits a landmark: squares of what the edges, the sides, the sag and
  * the tint are off, and of how vague the scale is, each over what it usually is. Real strips seldom
  * have more than a few. */
-static double misfit(const eye_strip *strip, double constant)
+static double misfit(const eye_strip *strip, double constant, int sharp)
 {
     double sag = hypot(strip->sag_sigma, USUAL_PITCH * strip->unit / constant);
     double edges = strip->noise / USUAL_NOISE, sides = strip->side_noise / USUAL_SIDE_NOISE;
-    double tint = strip->tint > 0 ? strip->tint / USUAL_TINT : 0;
+    double tint = strip->tint > 0 ? strip->tint / (sharp ? USUAL_SHARP_TINT : USUAL_TINT) : 0;
     double bend = strip->sag / (USUAL_BEND * sag);
     double vague = strip->unit_sigma / USUAL_SIGMA;
     return edges * edges + sides * sides + bend * bend + tint * tint + vague * vague;
@@ -83,7 +84,7 @@ static void note_scale(const eye_scale *scale, double thick, eye_strip *out)
  * has read, and then what the levels say. */
 static int read_strip(const eye_task *task, const eye_candidate *candidate,
                       eye_upright *upright, double thick, int sharp, int *id,
-                      eye_scale *scale, double levels[][3], eye_strip *out)
+                      eye_scale *scale, double levels[][EYE_LIGHTS], eye_strip *out)
 {
     int segments = 2 * candidate->bits + 5, wanted = *id;
     char code[EYE_CODE_SIZE];
@@ -96,7 +97,7 @@ static int read_strip(const eye_task *task, const eye_candidate *candidate,
     if (!eye_segment_levels(upright, scale, code, segments, levels))
         return EYE_NO_SCALE;
     double noise = scale->noise / sqrt(scale->unit > 1 ? scale->unit : 1);
-    reason = eye_read(task, levels, segments, upright->channels, noise, out->width,
+    reason = eye_read(task, levels, segments, upright->channels, sharp, noise, out->width,
                       candidate->open_top || candidate->open_bottom, out->code, &out->tint);
     if (reason != EYE_READ)
         return reason;
@@ -110,7 +111,7 @@ static int read_strip(const eye_task *task, const eye_candidate *candidate,
 /* Straightens, fits and reads a candidate; the reason where it is no code. */
 static int read_candidate(const eye_picture *picture, const eye_task *task,
                           const eye_candidate *candidate, double thick, int sharp,
-                          eye_upright *upright, eye_scale *scale, double levels[][3],
+                          eye_upright *upright, eye_scale *scale, double levels[][EYE_LIGHTS],
                           eye_strip *out)
 {
     int id = candidate->id, before = 0, reason = EYE_NO_CODE, coloured = picture->channels == 3;
@@ -160,7 +161,7 @@ static int examine(const eye_picture *picture, const eye_task *task,
 {
     int segments = 2 * candidate->bits + 5;
     double thick = thickest(task, candidate->bits);
-    double levels[EYE_MOST_SEGMENTS][3];
+    double levels[EYE_MOST_SEGMENTS][EYE_LIGHTS];
     eye_upright upright;
     eye_scale scale;
     eye_side side;
@@ -207,7 +208,7 @@ static int examine(const eye_picture *picture, const eye_task *task,
     /* The bearing is that of the middle row, and the lean has to tell where the strip is there. */
     double away = picture->rows / 2.0 - upright.bright_row;
     out->column_sigma = hypot(side.sigma, upright.lean_sigma * away);
-    double off = misfit(out, task->constant), most = most_misfit(out);
+    double off = misfit(out, task->constant, sharp), most = most_misfit(out);
     if (!(off <= most)) /* or no number */
         return EYE_POOR_FIT;
     doubt /= USUAL_DOUBT;
@@ -224,7 +225,7 @@ static eye_strip look_closely(const eye_picture *picture, const eye_task *task,
     strip.reason = examine(picture, task, candidate, 0, &strip);
     int sure = strip.reason == EYE_READ || strip.reason == EYE_COVERED ||
                strip.reason == EYE_NO_BAR || strip.reason == EYE_GOES_ON;
-    if (sure || picture->channels == 1 || unit >= SHARP)
+    if (sure || unit >= SHARP || !eye_has_blurred_colour(picture, task, candidate))
         return strip;
     other.reason = examine(picture, task, candidate, 1, &other);
     return other.reason == EYE_READ ? other : strip;

@@ -51,11 +51,10 @@ typedef struct {
 typedef struct {
     const eye_scale *scale;
     const char *code;
-    double (*levels)[3];
+    double (*levels)[EYE_LIGHTS];
     int segments, channels;
-    double dark[3], bright[3], contrast;
-    int channel;         /* in which the paint is brightest; of its light in the dark rows */
-    double black, usual; /* the middle one and how far others are from it */
+    double dark[EYE_LIGHTS], bright[EYE_LIGHTS], contrast;
+    double black, usual; /* brightness of the dark rows: the middle one and how far others are from it */
     margin beside[2];
 } scene;
 
@@ -244,10 +243,9 @@ static double swells(const scene *s, const eye_task *task, int i, int from, int 
     return at_most(most);
 }
 
-/* The light of the dark rows, off the bright segments' edges, in the run from ``from`` to ``to`` or
+/* The brightness of the dark rows, off the bright segments' edges, in the run from ``from`` to ``to`` or
  * (both 0) in all of them. */
-static int dark_rows(const scene *s, const eye_upright *u, int channel, int from, int to,
-                     double *values)
+static int dark_rows(const scene *s, const eye_upright *u, int from, int to, double *values)
 {
     double keep = EDGE + EDGE_BLUR * s->scale->blur;
     int n = 0, r = 0;
@@ -260,7 +258,7 @@ static int dark_rows(const scene *s, const eye_upright *u, int channel, int from
         for (; r < u->rows && u->first + r * u->bin + 0.5 <= upper; r++)
             ;
         for (; r < u->rows && u->first + (r + 1) * u->bin - 0.5 < lower; r++)
-            values[n++] = u->channel[r][channel];
+            values[n++] = u->light[r];
     }
     return n;
 }
@@ -269,7 +267,7 @@ static int dark_rows(const scene *s, const eye_upright *u, int channel, int from
 static int know_dark_rows(scene *s, const eye_upright *u)
 {
     double values[EYE_MOST_ROWS];
-    int n = dark_rows(s, u, s->channel, 0, 0, values);
+    int n = dark_rows(s, u, 0, 0, values);
     if (n < 3)
         return 0;
     s->black = middle_of(values, n);
@@ -282,8 +280,8 @@ static int know_dark_rows(scene *s, const eye_upright *u)
 /* Whether there is something brighter amid the run of dark rows: evidence. */
 static double step(const scene *s, const eye_upright *u, int from, int to)
 {
-    double values[EYE_MOST_ROWS], most = 0, room = s->bright[s->channel] - s->black;
-    int n = dark_rows(s, u, s->channel, from, to, values);
+    double values[EYE_MOST_ROWS], most = 0, room = s->bright[EYE_LIGHT] - s->black;
+    int n = dark_rows(s, u, from, to, values);
     for (int i = 0; i < n; i++)
         most = fmax(most, values[i] - s->black);
     return room > 0 ? at_most(most / (STEP * room + STEP_SPREAD * s->usual)) : 0;
@@ -292,7 +290,7 @@ static double step(const scene *s, const eye_upright *u, int from, int to)
 /* Whether something stands in front of a bit that reads dark. */
 int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *u,
                  const eye_scale *scale, const eye_side *side, const char *code,
-                 double levels[][3], int segments)
+                 double levels[][EYE_LIGHTS], int segments)
 {
     scene s; /* all but large tables set here */
     s.scale = scale;
@@ -300,10 +298,9 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
     s.levels = levels;
     s.segments = segments;
     s.channels = p->channels;
-    s.channel = p->channels == 3 ? task->high : 0;
     s.contrast = 0;
     double values[EYE_MOST_SEGMENTS];
-    for (int c = 0; c < p->channels; c++) {
+    for (int c = 0; c < EYE_LIGHTS; c++) {
         int n = 0;
         for (int i = 2; i < segments - 2; i++)
             if (code[i] == '0')
@@ -311,7 +308,8 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
         s.dark[c] = middle_of(values, n);
         s.bright[c] = (levels[0][c] + levels[1][c] + levels[segments - 2][c] +
                        levels[segments - 1][c]) / 4;
-        s.contrast = fmax(s.contrast, s.bright[c] - s.dark[c]);
+        if (c < p->channels)
+            s.contrast = fmax(s.contrast, s.bright[c] - s.dark[c]);
     }
     int filled = 0, rows = 0;
     if (s.contrast <= 0 || scale->unit < LEAST_UNIT)

@@ -7,6 +7,8 @@
 #define EYE_MOST_CANDIDATES 24
 #define EYE_MOST_ROWS 512    /* of a profile: about 4 a segment are needed */
 #define EYE_MOST_COLUMNS 160 /* of a profile across */
+#define EYE_LIGHTS 4         /* what is known of a segment: three channels and */
+#define EYE_LIGHT 3          /* the brightness */
 #define EYE_FAINTEST 16      /* grey levels of colour that are none */
 
 /* ---- the steps ---- */
@@ -62,27 +64,30 @@ int eye_search(const eye_picture *picture, const eye_task *task, eye_candidate *
 int eye_straighten(const eye_picture *picture, const eye_task *task,
                    const eye_candidate *candidate, const char *code, double aspect, int sharp,
                    eye_upright *out);
+/* Whether the colour of what a candidate covers is blurred along it, and its brightness is not. */
+int eye_has_blurred_colour(const eye_picture *picture, const eye_task *task,
+                           const eye_candidate *candidate);
 int eye_fit_scale(const eye_upright *upright, const eye_task *task, const char *code,
                   const eye_candidate *candidate, int sharp, eye_scale *out);
 void eye_refine_scale(const eye_upright *upright, const eye_task *task, const char *code,
                       const eye_candidate *candidate, eye_scale *scale);
 void eye_take_leak(eye_upright *upright, double leak);
 int eye_segment_levels(const eye_upright *upright, const eye_scale *scale, const char *code,
-                       int segments, double levels[][3]);
-int eye_read(const eye_task *task, double levels[][3], int segments, int channels, double noise,
-             double width, int open, char *code, double *tint);
+                       int segments, double levels[][EYE_LIGHTS]);
+int eye_read(const eye_task *task, double levels[][EYE_LIGHTS], int segments, int channels, int sharp,
+             double noise, double width, int open, char *code, double *tint);
 int eye_fit_side(const eye_picture *picture, const eye_upright *upright, double half, int flat,
                  eye_side *out);
 int eye_look_at_ends(const eye_picture *picture, const eye_upright *upright,
                      const eye_scale *scale, const eye_side *side,
-                     const eye_candidate *candidate, const char *code, double levels[][3],
+                     const eye_candidate *candidate, const char *code, double levels[][EYE_LIGHTS],
                      int segments, double *doubt);
 int eye_covered(const eye_picture *picture, const eye_upright *upright, const eye_scale *scale,
-                const eye_side *side, const char *code, double levels[][3], int segments,
+                const eye_side *side, const char *code, double levels[][EYE_LIGHTS], int segments,
                 double noise);
 int eye_in_front(const eye_picture *picture, const eye_task *task, const eye_upright *upright,
                  const eye_scale *scale, const eye_side *side, const char *code,
-                 double levels[][3], int segments);
+                 double levels[][EYE_LIGHTS], int segments);
 
 /* ---- numbers ---- */
 

@@ -1,7 +1,8 @@
 /* From the light of the segments to the code, or to the reason why there is none.
  *
  * The end bars say what bright looks like here, the fences between the bits what dark looks like.
- * Every segment must look like one of the two, in every channel; anything in between is no code. */
+ * Every segment must look like one of the two, in every channel, or (``sharp``) in brightness where
+ * colour is blurred over more than a segment; anything in between is no code. */
 #include "internal.h"
 
 #include <math.h>
@@ -16,10 +17,11 @@
 #define FULL_SHARE 0.2     /* as much more for black, as bright paint has lost its lead */
 #define LEAST_COLOUR 0.25  /* of the bright paint's light: its brightest channel minus its darkest */
 
-int eye_read(const eye_task *task, double levels[][3], int segments, int channels, double noise,
-             double width, int open, char *code, double *tint)
+int eye_read(const eye_task *task, double levels[][EYE_LIGHTS], int segments, int channels, int sharp,
+             double noise, double width, int open, char *code, double *tint)
 {
-    double first[3], last[3], dark[3] = {0}, mean[3];
+    double first[EYE_LIGHTS], last[EYE_LIGHTS], dark[EYE_LIGHTS] = {0}, mean[EYE_LIGHTS];
+    int from = sharp ? EYE_LIGHT : 0, to = sharp ? EYE_LIGHTS : channels; /* what is judged */
     double room = TOLERANCE + 2 * noise;
     room = room > MOST_TOLERANCE ? MOST_TOLERANCE : room;
     /* Where an end bar's end is not to be seen it may be something else that is as bright. */
@@ -27,14 +29,16 @@ int eye_read(const eye_task *task, double levels[][3], int segments, int channel
     double dark_room = DARK_TOLERANCE + 2 * noise;
     int fences = 0;
     for (int i = 2; i < segments - 2; i += 2, fences++)
-        for (int c = 0; c < channels; c++)
+        for (int c = 0; c < EYE_LIGHTS; c++)
             dark[c] += levels[i][c];
     double dimmest = 1e9, darkest = 0, differ = 0, powers = 0;
-    for (int c = 0; c < channels; c++) {
+    for (int c = 0; c < EYE_LIGHTS; c++) {
         first[c] = (levels[0][c] + levels[1][c]) / 2;
         last[c] = (levels[segments - 1][c] + levels[segments - 2][c]) / 2;
         mean[c] = (first[c] + last[c]) / 2;
         dark[c] /= fences;
+    }
+    for (int c = from; c < to; c++) {
         differ += (first[c] - last[c]) * (first[c] - last[c]);
         powers += (mean[c] - dark[c]) * (mean[c] - dark[c]);
         if (dark[c] > darkest)
@@ -43,8 +47,8 @@ int eye_read(const eye_task *task, double levels[][3], int segments, int channel
     int reason = EYE_READ;
     for (int i = 0; i < segments; i++) {
         double place = i / (segments - 1.0), power = 0, along = 0, sum = 0, off = 0, top = 0;
-        double step[3];
-        for (int c = 0; c < channels; c++) {
+        double step[EYE_LIGHTS];
+        for (int c = from; c < to; c++) {
             /* Light may change along the pole: bright is interpolated between the end bars. */
             double bright = first[c] * (1 - place) + last[c] * place;
             step[c] = bright - dark[c];
@@ -59,7 +63,7 @@ int eye_read(const eye_task *task, double levels[][3], int segments, int channel
         if (power <= 1e-7 || sum <= 0)
             return EYE_NO_CONTRAST;
         double share = along / power;
-        for (int c = 0; c < channels; c++) {
+        for (int c = from; c < to; c++) {
             double aside = levels[i][c] - dark[c] - share * step[c];
             off += aside * aside;
         }

@@ -344,8 +344,11 @@ int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candida
     double across_first = first + (step - 1) / 2.0;
     cap_signal(bands, n, columns, (int)lround((c->column - across_first) / step));
     double lean = find_lean(bands, n, columns, step, row, length, wide > 2 ? wide : 2, sharp);
-    if (fabs(lean) > STEEPEST)
-        return EYE_LEANS;
+    if (fabs(lean) > STEEPEST) {
+        if (!sharp)
+            return EYE_LEANS;
+        lean = 0; /* what stands beside a far one pulls at its brightness */
+    }
     difference(bands, n, columns, step, row, lean, 0, sharp, out->across);
     for (int i = 0; i < columns; i++)
         if (first + i * step < 0 || first + (i + 1) * step > p->columns)

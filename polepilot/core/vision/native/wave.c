@@ -144,20 +144,20 @@ void eye_take_leak(eye_upright *u, double leak)
 /* Gives segments of end bars that are out of the picture the light of their bar's other segment,
  * without that the mean light of the bright bits; 0 where any other one is out of the picture, or
  * both bars. */
-static int stand_in(const int *seen, const char *code, int segments, double levels[][3])
+static int stand_in(const int *seen, const char *code, int segments, double levels[][EYE_LIGHTS])
 {
-    double bits[3] = {0};
+    double bits[EYE_LIGHTS] = {0};
     int ones = 0, bars = 0;
     for (int i = 2; i < segments - 2; i++) {
         if (!seen[i])
             return 0;
         if (code[i] == '0')
             continue;
-        for (int c = 0; c < 3; c++)
+        for (int c = 0; c < EYE_LIGHTS; c++)
             bits[c] += levels[i][c];
         ones++;
     }
-    for (int c = 0; c < 3; c++)
+    for (int c = 0; c < EYE_LIGHTS; c++)
         bits[c] /= ones > 0 ? ones : 1;
     for (int bar = 0; bar < 2; bar++) {
         int outer = bar ? segments - 1 : 0, inner = bar ? segments - 2 : 1;
@@ -170,13 +170,13 @@ static int stand_in(const int *seen, const char *code, int segments, double leve
     return bars > 0;
 }
 
-/* Light of every segment with its neighbours' blur taken out, per channel; 0 where it cannot be
- * told. */
+/* Light of every segment with its neighbours' blur taken out, of every channel and of the brightness;
+ * 0 where it cannot be told. */
 int eye_segment_levels(const eye_upright *u, const eye_scale *scale, const char *code,
-                       int segments, double levels[][3])
+                       int segments, double levels[][EYE_LIGHTS])
 {
     enum { MOST = EYE_MOST_SEGMENTS + 2 };
-    double matrix[MOST * MOST] = {0}, right[MOST * 3] = {0};
+    double matrix[MOST * MOST] = {0}, right[MOST * EYE_LIGHTS] = {0};
     double guess[EYE_PARAMETERS] = {0};
     int n = segments + 2;
     guess[EYE_MIDDLE] = scale->middle;
@@ -204,20 +204,22 @@ int eye_segment_levels(const eye_upright *u, const eye_scale *scale, const char 
         }
         share[last] = before;
         for (int a = passed; a <= last; a++) {
+            double *sums = right + a * EYE_LIGHTS;
             for (int c = 0; c < 3; c++)
-                right[a * 3 + c] += share[a] * u->channel[i][c];
+                sums[c] += share[a] * u->channel[i][c];
+            sums[EYE_LIGHT] += share[a] * u->light[i];
             for (int b = passed; b <= a; b++)
                 matrix[a * n + b] += share[a] * share[b];
         }
     }
     for (int a = 0; a < n; a++)
         matrix[a * n + a] += LEVEL_RIDGE;
-    if (!eye_solve(matrix, right, n, 3))
+    if (!eye_solve(matrix, right, n, EYE_LIGHTS))
         return 0;
     double begin = u->first, end = u->first + u->rows * u->bin;
     int seen[EYE_MOST_SEGMENTS];
     for (int i = 0; i < segments; i++) {
-        memcpy(levels[i], right + (i + 1) * 3, sizeof levels[i]);
+        memcpy(levels[i], right + (i + 1) * EYE_LIGHTS, sizeof levels[i]);
         seen[i] = fmin(place[i + 1], end) - fmax(place[i], begin) >=
                   SEEN * (place[i + 1] - place[i]);
     }

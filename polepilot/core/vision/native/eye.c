@@ -16,8 +16,9 @@
 #define USUAL_SIGMA 0.0040      /* of the unit, as a share of it */
 #define USUAL_DOUBT 1.5         /* rest of an end bar as paint, over its rest as what is behind it */
 #define SURE 6e-4              /* share of the unit: no second fit makes it better */
-#define SHARP 3.3              /* rows per segment: blurred colour still parts them */
+#define SHARP 5.0              /* rows per segment: blurred colour still parts them */
 #define FAR 4.0                /* rows per segment: */
+#define FARTHER 1.5            /* rows less, and nothing fits well any more */
 #define MISFIT_A_FAR_BIT 7.0   /* what a further bright bit allows to a code with fewer */
 #define MOST_BLUR 0.5          /* rows, and three tenths of a segment */
 #define SHORTEST 1.25          /* rows per segment */
@@ -66,7 +67,7 @@ static double most_misfit(const eye_strip *strip)
         ones += strip->id >> bit & 1;
     /* A code of bright bits alone is not as much evidence: many things are evenly striped. */
     if (ones == strip->bits)
-        return MOST_MISFIT + MISFIT_A_BIT * (ones - 2);
+        return MOST_MISFIT + MISFIT_A_BIT * (ones - 2) * eye_limit((FAR - strip->unit) / FARTHER, 0, 1);
     return MOST_MISFIT + (strip->unit < FAR ? MISFIT_A_FAR_BIT : MISFIT_A_BIT) * (ones - 1);
 }
 

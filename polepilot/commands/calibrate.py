@@ -1,4 +1,4 @@
-"""`polepilot calibrate`: the camera constant, the lens, and the pan potentiometer."""
+"""`polepilot calibrate`: the camera constant, the lens, the pan potentiometer, motors and servo."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from polepilot.commands.outcome import Target
+from polepilot.commands.outcome import Outcome, Target
 from polepilot.core.errors import InputError
 
 if TYPE_CHECKING:
     from polepilot.core.landmark import Landmark
+    from polepilot.server.settings import Settings
 
-app = typer.Typer(help="Calibrate camera and pan unit; results go to robot.toml.")
+app = typer.Typer(help="Calibrate camera, pan unit and drive; results go to robot.toml.")
 
 Config = Annotated[
     Path | None, typer.Option(metavar="robot.toml", help="What is known of the robot so far.")
@@ -26,7 +27,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="One JSON document.")]
 
 @app.callback()
 def main() -> None:
-    """Calibrate camera and pan unit; results go to robot.toml."""
+    """Calibrate camera, pan unit and drive; results go to robot.toml."""
 
 
 @app.command()
@@ -181,3 +182,107 @@ def pan(
         landmarks = given or recorded
     about = f"standing from {start:.1f} to {end:.1f} s: {len(found)} sightings"
     target.finish(calibrate_survey(found, landmarks, unit, facing, about))
+
+
+@app.command()
+def drive(
+    port: Annotated[
+        str | None,
+        typer.Argument(help="Of the board, as for doctor --link; only when a terminal guides."),
+    ] = None,
+    run: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="DUTY%,SERVO°,SECONDS=AHEAD,LEFT",
+            help="A run that was driven and measured (metres), as 40,0,4=0.81,0.02: with these "
+            "nothing is driven. Best are five: two straight on at one duty for different times, "
+            "one at another duty, one to the left, one to the right.",
+        ),
+    ] = None,
+    turns: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LEFT,RIGHT", help="Turns of both wheels in the same time under equal duty."
+        ),
+    ] = None,
+    servo_range: Annotated[
+        float | None,
+        typer.Option(
+            metavar="DEGREES", min=1, max=89, help="How far the servo turns to either side."
+        ),
+    ] = None,
+    board: Annotated[
+        str, typer.Option(help="serial, or for a try without hardware simulated or host.")
+    ] = "serial",
+    baud: Annotated[
+        int | None,
+        typer.Option(
+            min=1200, max=4_000_000, help="Bits per second.", show_default="as configured"
+        ),
+    ] = None,
+    space: Annotated[
+        float, typer.Option(min=0.5, max=20, help="Free floor ahead and to both sides, metres.")
+    ] = 2.0,
+    config: Config = None,
+    write: Write = False,
+    as_json: AsJson = False,
+) -> None:
+    """Speeds, dead band, trim, and the servo's centre, scale and range.
+
+    Guided on a terminal: what to do, step by step; nothing moves without a yes. Or with --run,
+    from numbers that were measured before.
+    """
+    import math
+
+    from polepilot.commands.calibrate_drive import calibrate_drive, parse_run, parse_turns
+
+    target = Target(config, write, as_json)
+    settings = target.settings()
+    if run:
+        if port is not None:
+            raise InputError("--run is given with a port: expected one of the two.")
+        outcome = calibrate_drive(
+            [parse_run(text) for text in run],
+            settings,
+            trim=None if turns is None else parse_turns(turns),
+            servo_limit=None if servo_range is None else math.radians(servo_range),
+        )
+    else:
+        if turns is not None or servo_range is not None:
+            raise InputError("--turns and --servo-range go with --run.")
+        outcome = _guided(port, board, baud, space, settings)
+    target.finish(outcome)
+
+
+def _guided(
+    port: str | None, board: str, baud: int | None, space: float, settings: Settings
+) -> Outcome:
+    """Lead whoever sits at this terminal.
+
+    Raises:
+        InputError: nobody does.
+    """
+    from polepilot.commands.calibrate_drive import calibrate_drive
+    from polepilot.commands.calibrate_drive_guide import Guide
+    from polepilot.commands.doctor import open_stage
+    from polepilot.commands.person import Terminal
+    from polepilot.core.link.workbench import Workbench
+
+    if not Terminal.present():
+        raise InputError(
+            "There is no terminal to ask before each motion: expected one, or measured runs, as "
+            "--run 40,0,4=0.81,0.02."
+        )
+    stage = open_stage(board, port, baud, settings)
+    hall = stage.hall
+    with Workbench(stage.port, stage.clock) as bench:
+        found = Guide(
+            bench,
+            Terminal(),
+            settings.model.vehicle,
+            settings.calibration,
+            space=space,
+            lift=(lambda: None) if hall is None else hall.put_on_line,
+            hint=None if hall is None else hall.measured,
+        ).lead()
+    return calibrate_drive(found.runs, settings, trim=found.trim, servo_limit=found.servo_limit)

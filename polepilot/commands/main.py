@@ -19,6 +19,7 @@ from typer.exceptions import TyperException
 
 from polepilot.commands import bench, calibrate, landmarks
 from polepilot.commands.detect import detect
+from polepilot.commands.doctor import doctor
 from polepilot.commands.evaluate import evaluate
 from polepilot.commands.plan import plan
 from polepilot.commands.precision import precision
@@ -36,10 +37,21 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for _command in (serve, detect, plan, precision, simulate, replay, evaluate, recover, survey):
+for _command in (
+    serve,
+    detect,
+    plan,
+    precision,
+    simulate,
+    replay,
+    evaluate,
+    recover,
+    survey,
+    doctor,
+):
     app.command()(_command)
 app.add_typer(landmarks.app, name="landmarks", help="Print landmarks to scale, choose their ids.")
-app.add_typer(calibrate.app, name="calibrate", help="Camera constant, lens, pan unit.")
+app.add_typer(calibrate.app, name="calibrate", help="Camera constant, lens, pan unit, drive.")
 app.add_typer(bench.app, name="bench", help="Measure how fast and how well parts work.")
 
 

@@ -71,6 +71,7 @@ class HostLink:
         self._events: list[LinkEvent] = []
         self._samples: deque[TelemetrySample] = deque(maxlen=200)
         self._arrivals: deque[float] = deque(maxlen=400)
+        self._trips: deque[float] = deque(maxlen=200)
         self._clock = ClockMap()
         self._now = 0.0
 
@@ -145,6 +146,12 @@ class HostLink:
         samples = list(self._samples)
         self._samples.clear()
         return samples
+
+    def round_trips(self) -> list[float]:
+        """Of the PINGs answered since the last call, milliseconds; at most the last 200."""
+        trips = list(self._trips)
+        self._trips.clear()
+        return trips
 
     def events(self) -> list[LinkEvent]:
         """What happened since the last call, oldest first."""
@@ -332,6 +339,7 @@ class HostLink:
         if self._ping is None or message.echo != self._ping[0]:
             return
         self._round_trip = (now - self._ping[1]) * 1000
+        self._trips.append(self._round_trip)
         best = self._best_round_trip
         self._best_round_trip = self._round_trip if best is None else min(best, self._round_trip)
         self._ping = None

@@ -26,6 +26,8 @@ class Disturbances:
     """The right wheel turns so much faster than the left one, as a share."""
     steering_offset: float = math.radians(1.0)
     """Where the front wheel points when it is told to point straight ahead."""
+    dead_band: float = 0.0
+    """Share of the full duty below which a wheel stands: friction in the gears."""
     motor_lag: float = 0.08
     friction: float = 1.0
     """What slows a wheel down besides, once its duty is zero, m/s²: gears, and the bridge that
@@ -162,8 +164,9 @@ class Motion:
         off, vehicle = self._off, self._vehicle
         full = self._full_speed * (1 + off.speed_scale) / 1000
         share = _share(dt, off.motor_lag)
-        self.left += share * (actuation.left * full * (1 - off.wheel_difference / 2) - self.left)
-        self.right += share * (actuation.right * full * (1 + off.wheel_difference / 2) - self.right)
+        left, right = self._felt(actuation.left), self._felt(actuation.right)
+        self.left += share * (left * full * (1 - off.wheel_difference / 2) - self.left)
+        self.right += share * (right * full * (1 + off.wheel_difference / 2) - self.right)
         rub = off.friction * dt
         if actuation.left == 0:
             self.left -= min(max(self.left, -rub), rub)
@@ -201,6 +204,14 @@ class Motion:
             y + chord * math.sin(heading + turned / 2),
             wrap_angle(heading + turned),
         )
+
+    def _felt(self, duty: float) -> float:
+        """What is left of a duty beyond the dead band, per mille."""
+        band = self._off.dead_band
+        if band == 0:
+            return duty
+        share = (abs(duty) / 1000 - band) / (1 - band)
+        return math.copysign(max(0.0, share) * 1000, duty)
 
     def _slip_burst(self, dt: float) -> float:
         """Share of the speed that is lost just now."""

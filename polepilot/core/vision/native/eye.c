@@ -216,8 +216,8 @@ static int examine(const eye_picture *picture, const eye_task *task,
     return off + doubt * doubt > most ? EYE_NO_BAR : EYE_READ;
 }
 
-/* Examines a candidate by its colour and, if that is of no use on a far one, by its brightness: JPEG
- * and cheap sensors blur colour over as many rows as a segment has. */
+/* Examines a candidate by its colour and, if that is of no use on a far one whose colour is blurred, by
+ * its brightness: JPEG and cheap sensors blur colour over as many rows as a segment has. */
 static eye_strip look_closely(const eye_picture *picture, const eye_task *task,
                               const eye_candidate *candidate)
 {

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from shapely import LineString, MultiPolygon, Polygon
 
 from polepilot.core.plan import PlanPart
+from polepilot.core.planning.patches import pieces_of, standing_place, strip_of
 from polepilot.core.planning.space import FreeSpace, polygons
 
 Points = NDArray[np.float64]
@@ -25,8 +26,6 @@ _SLIVER = 0.002
 """What is thinner than twice this is left, metres."""
 _LOSS = 0.0003
 """So much may be swept no more where a bump cuts across, m² for a tool of 0.4 m."""
-_TIP = 0.03
-"""Of a patch so much, as a share of the tool's radius, may be left along its outline."""
 _PITCH = 1.7
 """A path beside a strip steps aside for half of this, as a share of the tool's radius."""
 _RISE = 0.9
@@ -93,13 +92,12 @@ class _Bumped:
 
     def reach(self, patch: Polygon, cuts: int) -> None:
         """Sweeps a patch by one bump, or by several if it is too long for one."""
-        small = shapely.minimum_bounding_radius(patch) < self._radius
-        place = self._place(patch) if small else None
+        place = standing_place(patch, self._space, self._radius)
         if place is not None:
             self._add(place)
         elif cuts:
-            strip = _strip(patch, _PITCH * self._radius)
-            for piece in strip or _pieces(patch, self._radius):
+            strip = strip_of(patch, _PITCH * self._radius)
+            for piece in strip or pieces_of(patch, self._radius):
                 if not (strip and self._step_aside(piece)):
                     self.reach(piece, cuts - 1)
 
@@ -140,17 +138,6 @@ class _Bumped:
         return any(first < bump[1] and bump[0] < last for bump in self._bumps) or bool(
             ((self._kept_marks > first) & (self._kept_marks < last)).any()
         )
-
-    def _place(self, patch: Polygon) -> shapely.Geometry | None:
-        """Where the tool's middle may be to sweep all of a patch; None: nowhere."""
-        core = patch.buffer(-_TIP * self._radius, quad_segs=2)
-        hull = shapely.convex_hull(patch if core.is_empty else core).simplify(0.001)
-        hull = shapely.get_coordinates(hull)[:-1]
-        discs = shapely.buffer(shapely.points(hull), self._radius - 0.0005, quad_segs=_ROUND)
-        place = shapely.intersection_all(discs)
-        if not self._space.holds(place):
-            place = shapely.intersection(place, self._space.polygon)
-        return None if place.is_empty else place
 
     def _add(self, place: shapely.Geometry) -> None:
         """Puts in a bump that touches ``place``, where that costs least."""
@@ -257,53 +244,3 @@ def _swept(lines: Iterable[Points], radius: float) -> shapely.Geometry:
     pairs = [np.vstack(pair) for line in lines for pair in pairwise(line)]
     capsules = shapely.buffer(shapely.linestrings(np.array(pairs)), radius, quad_segs=_ROUND)
     return shapely.union_all(capsules)
-
-
-def _box(patch: Polygon) -> tuple[Points, Points, Points] | None:
-    """A corner, the long side and the short side of the smallest box around a patch."""
-    box = shapely.minimum_rotated_rectangle(patch)
-    if not isinstance(box, Polygon):
-        return None
-    corners = shapely.get_coordinates(box)
-    if np.hypot(*(corners[1] - corners[0])) < np.hypot(*(corners[2] - corners[1])):
-        corners = np.vstack([corners[1:], corners[1:2]])
-    return corners[0], corners[1] - corners[0], corners[2] - corners[1]
-
-
-def _sliced(patch: Polygon, count: int) -> list[Polygon]:
-    """A patch cut across its long side into pieces of equal length."""
-    box = _box(patch)
-    if box is None:
-        return []
-    corner, along, across = box
-    found: list[Polygon] = []
-    for step in range(count):
-        first, last = (corner + along * share / count for share in (step, step + 1))
-        strip = Polygon([first, last, last + across, first + across])
-        found += [part for part in polygons(patch.intersection(strip)) if part.area > 1e-5]
-    return found
-
-
-def _strip(patch: Polygon, pitch: float) -> list[Polygon]:
-    """A straight strip in pieces of about ``pitch``; empty: it is none."""
-    box = _box(patch)
-    if box is None:
-        return []
-    length, width = (float(np.hypot(*side)) for side in box[1:])
-    if length < 1.2 * pitch or width > pitch or patch.area < 0.6 * length * width:
-        return []
-    return _sliced(patch, math.ceil(length / pitch))
-
-
-def _pieces(patch: Polygon, radius: float) -> list[Polygon]:
-    """A patch cut across its longest direction, so that bumps to its pieces are short."""
-    box = _box(patch)
-    if box is None:
-        return []
-    length, width = (float(np.hypot(*side)) for side in box[1:])
-    counts = np.arange(2, max(3, math.ceil(4 * length / radius)))
-    half = length / counts / 2
-    fits = half**2 + width**2 / 4 < (0.98 * radius) ** 2
-    cost = counts * (width + radius - np.sqrt(np.maximum(radius**2 - half**2, 0.0)))
-    count = int(counts[np.argmin(np.where(fits, cost, np.inf))]) if fits.any() else 2
-    return _sliced(patch, count)

@@ -31,7 +31,9 @@ from polepilot.core.planning.order import Run, ordered_runs
 from polepilot.core.planning.score import predict
 from polepilot.core.planning.space import FreeSpace, as_multi, free_poles, free_space, polygons
 from polepilot.core.planning.swept import swept_shape
+from polepilot.core.planning.track import without_jerks
 from polepilot.core.planning.unreachable import unreachable_pieces
+from polepilot.core.planning.visits import with_visits
 from polepilot.core.planning.wording import in_words
 from polepilot.core.site import Site
 
@@ -51,6 +53,8 @@ _LEAST = 0.0065
 """Missed patches smaller than this share of the tool's square get no bump."""
 _SHARE = 0.00008
 """Nor those smaller than this share of all that is to be swept."""
+_ENOUGH = 0.0003
+"""Where less than this share of all is missed, no further patch is visited."""
 _MANY = 60
 _SMALLEST = 0.008
 """Missed patches below this are left, m² for a tool of 0.4 m; scaled with its square."""
@@ -332,6 +336,21 @@ def _driven_path(
         pose = driver.track.pose
         _drive(driver, _nearest_first(more, pose.position), recorder, options)
     path, gear = driver.track.arrays()
+    parts = tuple(recorder.parts)
+    if len(path) > 1:
+        tool = options.tool_width
+        for _ in range(2):
+            path, gear, parts = with_visits(
+                path,
+                gear,
+                parts,
+                target.difference(swept_shape(path, tool)),
+                space,
+                tool,
+                driver.track.radius,
+                _LEAST * tool**2,
+                _ENOUGH * target.area,
+            )
     left = target.difference(swept_shape(path, options.tool_width)).area
     if left > 0.02 * target.area:
         notes.append(
@@ -343,7 +362,18 @@ def _driven_path(
             f"the robot cannot move from the start with a turning radius of "
             f"{in_words(options.min_turn_radius)}."
         )
-    return path, gear, tuple(recorder.parts)
+    path, gear, moved = without_jerks(path, gear)
+    return path, gear, _moved_parts(parts, moved)
+
+
+def _moved_parts(parts: tuple[PlanPart, ...], moved: NDArray[np.intp]) -> tuple[PlanPart, ...]:
+    """Parts of a path of which some points were left out; ``moved``: where the others are now."""
+    ends = [0, *(int(moved[part.last]) for part in parts)]
+    return tuple(
+        PlanPart(part.kind, first, last)
+        for part, (first, last) in zip(parts, pairwise(ends), strict=True)
+        if last > first
+    )
 
 
 def _headings(space: FreeSpace, runs: list[Run]) -> list[float]:
@@ -360,13 +390,12 @@ def _headings(space: FreeSpace, runs: list[Run]) -> list[float]:
 def _drive(driver: Driver, runs: list[Run], recorder: _Recorder, options: PlanOptions) -> None:
     """Drives the runs; leaves out what cannot be reached or followed."""
     for run in runs:
-        points = run.points
         here = driver.track.pose.position
-        step = points[1] - points[0]
-        place = (float(points[0, 0]), float(points[0, 1]))
-        if not driver.connect(place, math.atan2(step[1], step[0])):
+        points = driver.enter(run.points)
+        if points is None:
             recorder.close("link", driver.track.last)
             continue
+        place = (float(points[0, 0]), float(points[0, 1]))
         near = bool(recorder.parts) and math.dist(here, place) <= 1.6 * options.tool_width
         recorder.close("bridge" if near else "link", driver.track.last)
         driver.follow(points)

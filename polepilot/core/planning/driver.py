@@ -28,6 +28,7 @@ from polepilot.core.planning.curves import (
 from polepilot.core.planning.space import FreeSpace
 from polepilot.core.planning.track import PLAIN, Track
 from polepilot.core.planning.turns import turns_round
+from polepilot.core.planning.ways import way_to_line
 
 Points = NDArray[np.float64]
 
@@ -41,7 +42,9 @@ _MOST_TURNS = 80
 """So many ways round one corner are tried, the cheapest first."""
 _SHORT = 0.15
 """A leg shorter than this is not worth a manoeuvre of its own, metres."""
-_MOST_TRIES = 6
+_MOST_TRIES = 20
+_AHEAD = (0.0, -0.6, 1.0, 1.6, 2.4)
+"""How far beyond a place its line may be joined, to drive back to it, in turning radii."""
 _BACK_OUT = (0.25, 0.5, 0.8, 1.2, 1.8, 2.6, 3.8, 5.5, 8.0, 12.0, 20.0, 40.0)
 """How far to back out along the track where nothing fits, metres."""
 
@@ -78,6 +81,16 @@ class Driver:
             if resumed is None:
                 return
             index = resumed
+
+    def enter(self, points: Points) -> Points | None:
+        """Goes to the first leg of ``points``, or else to a later one; what is left to follow."""
+        step = points[1] - points[0]
+        place = (float(points[0, 0]), float(points[0, 1]))
+        if self.connect(place, math.atan2(step[1], step[0])):
+            return points
+        points = _tidy(points)
+        leg = self._resume(points, 0)
+        return None if leg is None else points[leg - 1 :]
 
     def head_for(self, place: geometry.Point) -> bool:
         """Goes to ``place``, looking wherever: one curve and straight on, or what is cheaper.
@@ -182,7 +195,7 @@ class Driver:
         backs = [0.0, *(b for b in (0.5 * self._radius, self._radius) if b <= self.track.straight)]
         for back in backs:
             here = Pose2D(*pose.ahead(-back), pose.heading)
-            for ahead in (0.0, -0.6 * self._radius, self._radius):
+            for ahead in (share * self._radius for share in _AHEAD):
                 there = Pose2D(*goal.ahead(ahead), heading)
                 for curve in shortest_curves(here, there, self._radius, CHANGE)[:6]:
                     whole = joined((("S", -back), *curve, ("S", -ahead)))
@@ -320,11 +333,27 @@ class Driver:
             if self._connect_here(there, heading):
                 return leg + 1
             self.track.restore(saved)
+            if self._zigzag(points[leg], points[leg + 1]):
+                return leg + 1
             if self.connect(there, heading):
                 return leg + 1
             if tries >= _MOST_TRIES:
                 break
         return None
+
+    def _zigzag(self, first: Points, last: Points) -> bool:
+        """Gets onto a leg at its beginning in short pieces to and fro, whichever way round."""
+        pose = np.array([self.track.pose])
+        begin, end = ((float(x), float(y)) for x, y in (first, last))
+        found = way_to_line(self._space, pose, self._radius, begin, end)
+        if found is None:
+            return False
+        self.track.append(found[1])
+        heading = math.atan2(end[1] - begin[1], end[0] - begin[0])
+        if abs(angle_between(self.track.pose.heading, heading)) > math.pi / 2:
+            self.track.turn_round()
+        self.track.pose = Pose2D(*self.track.pose.position, heading)
+        return True
 
     def _fits(self, pose: Pose2D, curve: Curve) -> bool:
         return self._space.holds_points(sample(pose, curve, self._radius)[0])

@@ -154,8 +154,12 @@ def cleanup_strokes(
         along, across = corners[1] - corners[0], corners[2] - corners[1]
         length, width = float(np.hypot(*along)), float(np.hypot(*across))
         if width > 0.9 * tool_width and cuts:
-            middle = (corners[0] + corners[1]) / 2
-            cut = Polygon([corners[0], middle, middle + across, corners[0] + across])
+            if length > 1.5 * width and patch.area > 0.7 * length * width:
+                middle = corners[0] + across / 2  # passes side by side
+                cut = Polygon([corners[0], corners[1], middle + along, middle])
+            else:
+                middle = (corners[0] + corners[1]) / 2
+                cut = Polygon([corners[0], middle, middle + across, corners[0] + across])
             pending += [
                 (part, cuts - 1)
                 for half in (patch.intersection(cut), patch.difference(cut))

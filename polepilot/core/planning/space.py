@@ -80,6 +80,10 @@ class FreeSpace:
             return False
         return len(points) < 2 or self.holds(LineString(points))
 
+    def holds_each(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether the centre may be at each of N x 2 ``points``."""
+        return np.asarray(shapely.intersects_xy(self._loose, points[:, 0], points[:, 1]))
+
     def reachable(self) -> MultiPolygon:
         """The union of the clearance discs whose centres are in ``polygon``."""
         discs = footprint(self.clearance).ground(self.polygon)

@@ -139,6 +139,31 @@ class Track:
         return float(_length(points) + CHANGE * changes)
 
 
+def without_jerks(
+    path: Points, gears: NDArray[np.int8], shortest: float = 0.0005
+) -> tuple[Points, NDArray[np.int8], NDArray[np.intp]]:
+    """A path without stretches in one gear below ``shortest`` metres, on which no wheel turns.
+
+    Also its gears, and for each point of the old path the index of the new one.
+    """
+    kept = np.arange(len(path))
+    while len(gears) > 1:
+        bounds = np.r_[0, np.flatnonzero(np.diff(gears)) + 1, len(gears)]
+        marks = np.r_[0.0, np.cumsum(np.hypot(*np.diff(path[kept], axis=0).T))]
+        brief = np.flatnonzero(np.diff(marks[bounds]) < shortest)
+        if not len(brief) or len(bounds) == 2:
+            break
+        first, last = bounds[brief[0]], bounds[brief[0] + 1]
+        # The stretch's end stays, but of the first stretch its beginning.
+        gone = slice(first, last) if first else slice(1, last + 1)
+        if first == 0 and last == len(gears):
+            break
+        kept = np.delete(kept, gone)
+        gears = np.delete(gears, slice(first, last))
+    moved = np.minimum(np.searchsorted(kept, np.arange(len(path))), len(kept) - 1)
+    return path[kept], gears, moved
+
+
 def _direction(step: Points) -> float:
     return math.atan2(step[1], step[0])
 

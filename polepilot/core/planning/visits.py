@@ -1,0 +1,252 @@
+"""Places that a steered wheel's path misses, visited from the path: a short way there, and back.
+
+The way back is the same curve in the other gear, so that the path goes on as if nothing had been:
+whatever leads to a place leads from it as well.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import LineString, Polygon
+
+from polepilot.core.geometry import Pose2D
+from polepilot.core.plan import PlanPart
+from polepilot.core.planning.curves import Curve, curve_length, drive, joined, sample
+from polepilot.core.planning.offset import cleanup_strokes
+from polepilot.core.planning.patches import pieces_of, standing_place
+from polepilot.core.planning.space import FreeSpace, polygons
+from polepilot.core.planning.ways import way_to_line, way_to_place
+
+Points = NDArray[np.float64]
+Gears = NDArray[np.int8]
+Indices = NDArray[np.intp]
+
+_SLIVER = 0.002
+"""What is thinner than twice this is left, metres."""
+_MOST_CUTS = 6
+"""How often a patch is halved until one place sweeps each piece."""
+_LEG = 0.16
+"""Straight pieces of the path longer than this may be left in between, metres."""
+_APART = 0.12
+"""Poses on the path from which a way is looked for are so far apart, metres."""
+_END = 0.07
+"""And so far from the ends of a straight piece."""
+_NEAR = 2.5
+"""Poses farther from the place than this are not looked at, in turning radii."""
+_MOST_POSES = 120
+_LEVELS = 4
+"""So many short pieces may be in a way to a place before the curve at its end."""
+_MOST_VISITS = 300
+_MOST_FAILURES = 25
+
+
+def with_visits(
+    path: Points,
+    gear: Gears,
+    parts: tuple[PlanPart, ...],
+    missed: shapely.Geometry,
+    space: FreeSpace,
+    tool: float,
+    radius: float,
+    smallest: float,
+    enough: float,
+) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
+    """The path with visits to patches of ``missed``, the largest first.
+
+    ``radius``: of the arcs that are driven, metres. ``smallest``: patches smaller than this are
+    left, m²; and so are all others as soon as they make up less than ``enough``.
+    """
+    opened = missed.buffer(-_SLIVER, quad_segs=2).buffer(_SLIVER, quad_segs=2)
+    patches = [patch for patch in polygons(opened) if patch.area >= smallest]
+    left = sum(float(patch.area) for patch in patches)
+    if left <= enough:
+        return path, gear, parts
+    visitor = _Visitor(path, gear, space, tool, radius)
+    for patch in sorted(patches, key=lambda p: (-float(p.area), p.bounds)):
+        if left <= enough or visitor.hopeless:
+            break
+        visitor.reach(patch, _MOST_CUTS, smallest / 4)
+        left -= float(patch.area)
+    return visitor.result(parts)
+
+
+@dataclass(frozen=True, slots=True)
+class _Visit:
+    """A way from the path to a place."""
+
+    index: int
+    """Of the segment that it leaves, or at whose end it leaves."""
+    share: float
+    """How far along that segment, 0 to 1."""
+    points: Points
+    gears: Gears
+
+    @property
+    def line(self) -> LineString:
+        return LineString(self.points)
+
+
+class _Visitor:
+    """A path while visits are added to it."""
+
+    def __init__(
+        self, path: Points, gear: Gears, space: FreeSpace, tool: float, radius: float
+    ) -> None:
+        self._path = path
+        self._gear = gear
+        self._space = space
+        self._tool = tool
+        self._radius = radius
+        self._poses = _poses(path, gear)
+        self.visits: list[_Visit] = []
+        self._failures = 0
+
+    def reach(self, patch: Polygon, cuts: int, smallest: float) -> None:
+        """Visits a patch: one place, else passes along it, else each of its pieces."""
+        if self.hopeless:
+            return
+        place = standing_place(patch, self._space, self._tool / 2)
+        if place is not None:
+            if self._visit(place):
+                return
+        elif passes := cleanup_strokes(patch, self._tool, self._space, smallest):
+            done = [self._pass(stroke.points) for stroke in passes]
+            if all(done):
+                return
+            for stroke in passes:
+                if not done.pop(0):
+                    strip = patch.intersection(stroke.line.buffer(self._tool / 2))
+                    self._divide(strip, cuts, smallest)
+            return
+        self._divide(patch, cuts, smallest)
+
+    def _divide(self, patch: shapely.Geometry, cuts: int, smallest: float) -> None:
+        if not cuts:
+            return
+        for part in polygons(patch):
+            for piece in pieces_of(part, self._tool / 2):
+                if piece.area >= smallest:
+                    self.reach(piece, cuts - 1, smallest)
+
+    @property
+    def hopeless(self) -> bool:
+        """Whether there were so many visits, or failures, that no more are tried."""
+        return len(self.visits) >= _MOST_VISITS or self._failures >= _MOST_FAILURES
+
+    def _visit(self, place: shapely.Geometry) -> bool:
+        """Adds the cheapest way that is found to a place; True as well if one led there before."""
+        if any(shapely.intersects(place, visit.line) for visit in self.visits):
+            return True
+        circle = shapely.maximum_inscribed_circle(place, tolerance=0.002)
+        x, y = (float(value) for value in shapely.get_coordinates(circle)[0])
+        near = self._near(x, y)
+        found = way_to_place(self._space, self._poses[near], self._radius, (x, y), _LEVELS)
+        return self._added(near, found, ())
+
+    def _pass(self, points: Points) -> bool:
+        """Adds a way along a straight line, entered at whichever end that is cheaper from."""
+        first, last = ((float(x), float(y)) for x, y in points[[0, -1]])
+        length = math.dist(first, last)
+        best: tuple[float, Indices, tuple[int, Curve], Curve] | None = None
+        for a, b in ((first, last), (last, first)):
+            near = self._near(*a)
+            found = way_to_line(self._space, self._poses[near], self._radius, a, b, _LEVELS)
+            if found is None:
+                continue
+            cost = curve_length(found[1])
+            if best is None or cost < best[0]:
+                pose = Pose2D(*self._poses[near[found[0]], :3].tolist())
+                for piece in found[1]:
+                    pose = drive(pose, piece, self._radius)
+                along = math.cos(pose.heading) * (b[0] - a[0])
+                along += math.sin(pose.heading) * (b[1] - a[1])
+                best = cost, near, found, (("S", math.copysign(length, along)),)
+        return best is not None and self._added(*best[1:])
+
+    def _added(self, near: Indices, found: tuple[int, Curve] | None, more: Curve) -> bool:
+        """Keeps a way that was found from one of the poses ``near``, with ``more`` at its end."""
+        if found is None:
+            self._failures += 1
+            return False
+        row = self._poses[near[found[0]]]
+        curve = joined((*found[1], *more))
+        points, gears, _ = sample(Pose2D(*row[:3].tolist()), curve, self._radius)
+        if not self._space.holds_points(points):
+            return False
+        self.visits.append(_Visit(int(row[3]), float(row[4]), points, gears))
+        return True
+
+    def _near(self, x: float, y: float) -> NDArray[np.intp]:
+        """Poses on the path from which ways to a place are looked for."""
+        distances = np.hypot(self._poses[:, 0] - x, self._poses[:, 1] - y)
+        order = np.argsort(np.round(distances, 6), kind="stable")[:_MOST_POSES]
+        return order[distances[order] < _NEAR * self._radius]
+
+    def result(self, parts: tuple[PlanPart, ...]) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
+        """The path with all visits, its gears, and its parts."""
+        points: list[Points] = [self._path[:1]]
+        gears: list[Gears] = []
+        moved = np.zeros(len(self._path), dtype=np.intp)
+        count, done, here = 1, 0, (-1, 0.0)
+        for visit in sorted(self.visits, key=lambda v: (v.index, v.share)):
+            stop = visit.index + (visit.share >= 1.0)
+            points.append(self._path[done + 1 : stop + 1])
+            gears.append(self._gear[done:stop])
+            moved[done + 1 : stop + 1] = count + np.arange(stop - done)
+            count += stop - done
+            done = stop
+            spot = (visit.index, visit.share)
+            if visit.share < 1.0 and spot != here:
+                here = spot
+                points.append(visit.points[:1])
+                gears.append(self._gear[visit.index : visit.index + 1])
+                count += 1
+            points += [visit.points[1:], visit.points[-2::-1]]
+            gears += [visit.gears, -visit.gears[::-1]]
+            count += 2 * len(visit.gears)
+        points.append(self._path[done + 1 :])
+        gears.append(self._gear[done:])
+        moved[done + 1 :] = count + np.arange(len(self._path) - done - 1)
+        ends = [int(moved[part.last]) for part in parts]
+        firsts = [0, *ends[:-1]]
+        return (
+            np.vstack(points),
+            np.concatenate(gears),
+            tuple(
+                PlanPart(part.kind, first, last)
+                for part, first, last in zip(parts, firsts, ends, strict=True)
+            ),
+        )
+
+
+def _poses(path: Points, gear: Gears) -> Points:
+    """Poses on straight pieces of the path: x, y, heading, index of the segment, share of it."""
+    steps = np.diff(path, axis=0)
+    lengths = np.hypot(*steps.T)
+    headings = np.arctan2(steps[:, 1] * gear, steps[:, 0] * gear)
+    rows: list[Points] = []
+    for index in np.flatnonzero(lengths > _LEG).tolist():
+        length = float(lengths[index])
+        count = max(1, int((length - 2 * _END) / _APART))
+        at = np.linspace(_END, length - _END, count) if count > 1 else np.array([length / 2])
+        share = at / length
+        spots = path[index] + share[:, None] * steps[index]
+        whole = np.full(len(at), headings[index]), np.full(len(at), float(index)), share
+        rows.append(np.column_stack([spots, *whole]))
+    # Where the robot turns round on a straight line, and on arcs between two equal chords.
+    turn = np.abs((np.diff(headings) + math.pi) % math.tau - math.pi)
+    back = (gear[:-1] != gear[1:]) & (turn < 1e-6) & (np.minimum(lengths[:-1], lengths[1:]) > _END)
+    arc = (gear[:-1] == gear[1:]) & (turn > 0.02) & (turn < 0.1)
+    arc &= (np.abs(lengths[:-1] - lengths[1:]) < 1e-6) & (lengths[1:] > 0.03)
+    for index in np.flatnonzero(back | arc).tolist():
+        middle = (
+            headings[index]
+            + ((headings[index + 1] - headings[index] + math.pi) % math.tau - math.pi) / 2
+        )
+        rows.append(np.array([[*path[index + 1], middle, index, 1.0]]))
+    return np.vstack(rows) if rows else np.zeros((0, 5))

@@ -1,0 +1,335 @@
+"""Ways of a steered wheel in tight places, looked for in short pieces to and fro.
+
+A wheel that turns no tighter than some radius still gets everywhere where its disc does, if it goes
+forward and backward often enough. From one pose or several the search goes on by short arcs and
+straight pieces, level by level; from each pose that it gets to it tries to end with a curve that is
+worked out: an arc and a straight piece to a place, or two arcs onto a line.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polepilot.core.geometry import Point, Pose2D
+from polepilot.core.planning.curves import CHANGE, Curve, joined, sample
+from polepilot.core.planning.space import FreeSpace
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+_STEPS = ((0.33, 7), (0.2, 13))
+"""Length of a piece, in turning radii, and how many there are at most; the longer ones first."""
+_MOST_STATES = 1000
+_MOST_CHECKS = 30
+"""So many ways are looked at closely on each level."""
+_SHORTEST = 0.03
+"""Pieces shorter than this are not driven, metres."""
+_TURN = math.radians(8.0)
+"""Headings nearer to each other than this count as one."""
+
+_MOVES = tuple((kind, sign) for kind in "SLR" for sign in (1.0, -1.0))
+
+
+@dataclass(slots=True, eq=False)
+class _States:
+    """Poses to which ways lead: columns of one length."""
+
+    x: Array
+    y: Array
+    heading: Array
+    cost: Array
+    move: Indices
+    """By which of ``_MOVES`` the robot came; -1: it is where it began."""
+    parent: Indices
+    """Index of the state before it, one level up."""
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    def take(self, rows: Indices) -> _States:
+        return _States(
+            self.x[rows],
+            self.y[rows],
+            self.heading[rows],
+            self.cost[rows],
+            self.move[rows],
+            self.parent[rows],
+        )
+
+    def local(self, x: float, y: float) -> tuple[Array, Array]:
+        """How far ahead and to the left a place is."""
+        cos, sin = np.cos(self.heading), np.sin(self.heading)
+        return (
+            cos * (x - self.x) + sin * (y - self.y),
+            -sin * (x - self.x) + cos * (y - self.y),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _End:
+    """A curve that leads from a state to the goal."""
+
+    row: int
+    cost: float
+    curve: Curve
+
+
+@dataclass(frozen=True, slots=True)
+class _Goal:
+    """Where to, as a search asks for it."""
+
+    ends: Callable[[_States], list[_End]]
+    """The cheapest last curves from some states."""
+    promise: Callable[[_States], Array]
+    """How far the goal is from each of them, about, metres."""
+
+
+def way_to_place(
+    space: FreeSpace, poses: Array, radius: float, place: Point, levels: int = 99
+) -> tuple[int, Curve] | None:
+    """A curve to a place, with whatever heading there, and from which row of ``poses`` it leads.
+
+    ``poses``: N x 3, x, y, heading, all of them in the free space. ``radius``: of all arcs,
+    metres. ``levels``: after so many pieces the search is given up. None: no way was found.
+    """
+    x, y = place
+
+    def ends(states: _States) -> list[_End]:
+        return _ends_at(states, x, y, radius)
+
+    def promise(states: _States) -> Array:
+        return np.asarray(np.hypot(states.x - x, states.y - y))
+
+    return _search(space, poses, radius, _Goal(ends, promise), levels)
+
+
+def way_to_line(
+    space: FreeSpace, poses: Array, radius: float, first: Point, last: Point, levels: int = 99
+) -> tuple[int, Curve] | None:
+    """A curve to ``first`` that ends on the line to ``last``, looking along it or away from it."""
+    heading = math.atan2(last[1] - first[1], last[0] - first[0])
+    length = math.dist(first, last)
+    cos, sin = math.cos(heading), math.sin(heading)
+
+    def ends(states: _States) -> list[_End]:
+        return _ends_on(states, first, heading, radius)
+
+    def promise(states: _States) -> Array:
+        along = cos * (states.x - first[0]) + sin * (states.y - first[1])
+        across = -sin * (states.x - first[0]) + cos * (states.y - first[1])
+        beyond = np.maximum(0.0, np.maximum(-along, along - length))
+        askew = np.abs(np.sin(states.heading - heading))
+        return np.asarray(np.hypot(across, beyond) + radius * askew)
+
+    return _search(space, poses, radius, _Goal(ends, promise), levels)
+
+
+def _search(
+    space: FreeSpace, poses: Array, radius: float, goal: _Goal, levels: int
+) -> tuple[int, Curve] | None:
+    if not len(poses):
+        return None
+    count = len(poses)
+    x, y, heading = poses[:, :3].T
+    begin = _States(x, y, heading, np.zeros(count), np.full(count, -1), np.arange(count))
+    found = _checked(space, [begin], radius, goal, 0.0)
+    for share, most in _STEPS:
+        if found is not None:
+            return found
+        step = share * radius
+        trail = [begin]
+        known: set[int] = set()
+        for _ in range(min(most, levels)):
+            every = _moved(space, trail[-1], radius, step)
+            states = every.take(_chosen(every, known, step, goal.promise(every)))
+            if not len(states):
+                break
+            trail.append(states)
+            found = _checked(space, trail, radius, goal, step)
+            if found is not None:
+                return found
+    return found
+
+
+def _checked(
+    space: FreeSpace, trail: list[_States], radius: float, goal: _Goal, step: float
+) -> tuple[int, Curve] | None:
+    """The cheapest curve to the goal from the last states of a trail that is free all the way."""
+    states = trail[-1]
+    checks = 0
+    for end in sorted(goal.ends(states), key=lambda end: (round(end.cost, 6), end.row)):
+        row = end.row
+        pose = Pose2D(float(states.x[row]), float(states.y[row]), float(states.heading[row]))
+        points = sample(pose, end.curve, radius)[0]
+        if not space.holds_each(points).all():
+            continue
+        start, curve = _traced(trail, row, end.curve, step)
+        first = trail[0]
+        pose = Pose2D(float(first.x[start]), float(first.y[start]), float(first.heading[start]))
+        if space.holds_points(sample(pose, curve, radius)[0]):
+            return start, curve
+        checks += 1
+        if checks == _MOST_CHECKS:
+            break
+    return None
+
+
+def _traced(trail: list[_States], row: int, end: Curve, step: float) -> tuple[int, Curve]:
+    """Where a way begins, and all of its pieces."""
+    pieces: list[tuple[str, float]] = []
+    for states in reversed(trail[1:]):
+        kind, sign = _MOVES[int(states.move[row])]
+        pieces.append((kind, sign * step))
+        row = int(states.parent[row])
+    return row, joined((*pieces[::-1], *end))
+
+
+def _changed(states: _States, sign: float) -> Array:
+    """What a change of gear costs those that went the other way before."""
+    return np.where((states.move >= 0) & ((states.move % 2 == 0) != (sign > 0)), CHANGE, 0.0)
+
+
+def _ends_at(states: _States, x: float, y: float, radius: float) -> list[_End]:
+    """An arc, and straight on to a place."""
+    ahead, aside = states.local(x, y)
+    found: list[_End] = []
+    for kind, side in (("L", 1.0), ("R", -1.0)):
+        for sign in (1.0, -1.0):
+            # Where the place lies as seen from the middle of the circle to that side.
+            along, across = sign * ahead, side * aside - radius
+            square = along**2 + across**2 - radius**2
+            rest = np.sqrt(np.maximum(square, 0.0))
+            turn = (np.arctan2(across, along) + np.arctan2(radius, rest)) % math.tau
+            turn = np.where(turn > math.tau - 1e-6, 0.0, turn)
+            good = (square >= 0) & (turn < 0.75 * math.pi)
+            good &= _driven(turn * radius) & _driven(rest)
+            cost = states.cost + turn * radius + rest + _changed(states, sign)
+            found += [
+                _End(
+                    row,
+                    float(cost[row]),
+                    ((kind, sign * radius * float(turn[row])), ("S", sign * float(rest[row]))),
+                )
+                for row in _best(good, cost)
+            ]
+    return found
+
+
+def _ends_on(states: _States, first: Point, heading: float, radius: float) -> list[_End]:
+    """Two arcs onto a line, and along it to its first place."""
+    found: list[_End] = []
+    for about in (0.0, math.pi):
+        for sign in (1.0, -1.0):
+            # As seen along the way that is driven: forward where it looks, backward its back.
+            way = heading + about + (0.0 if sign > 0 else math.pi)
+            cos, sin = math.cos(way), math.sin(way)
+            along = cos * (states.x - first[0]) + sin * (states.y - first[1])
+            across = -sin * (states.x - first[0]) + cos * (states.y - first[1])
+            askew = (states.heading - heading - about + math.pi) % math.tau - math.pi
+            for side in (1.0, -1.0):
+                middle = (1 + np.cos(askew) + side * across / radius) / 2
+                back = np.arccos(np.clip(middle, -1.0, 1.0))
+                turn = back - side * askew
+                met = along + side * radius * (2 * np.sin(side * back) - np.sin(askew))
+                good = (np.abs(middle) <= 1) & (turn >= 0) & (turn < 0.75 * math.pi)
+                good &= _driven(turn * radius) & _driven(back * radius) & _driven(np.abs(met))
+                cost = states.cost + radius * (turn + back) + np.abs(met)
+                cost = cost + _changed(states, sign) + CHANGE * (met > 0)
+                kinds = ("L", "R") if side * sign > 0 else ("R", "L")
+                found += [
+                    _End(
+                        row,
+                        float(cost[row]),
+                        (
+                            (kinds[0], sign * radius * float(turn[row])),
+                            (kinds[1], sign * radius * float(back[row])),
+                            ("S", -sign * float(met[row])),
+                        ),
+                    )
+                    for row in _best(good, cost)
+                ]
+    return found
+
+
+def _driven(length: Array) -> NDArray[np.bool_]:
+    """Whether a piece is nothing at all, or long enough."""
+    return np.asarray((length > _SHORTEST) | (length < 1e-7))
+
+
+def _best(good: NDArray[np.bool_], cost: Array) -> list[int]:
+    """The cheapest of the good rows."""
+    rows = np.flatnonzero(good)
+    order = np.argsort(np.round(cost[rows], 6), kind="stable")[: 2 * _MOST_CHECKS]
+    chosen: list[int] = rows[order].tolist()
+    return chosen
+
+
+def _moved(space: FreeSpace, states: _States, radius: float, step: float) -> _States:
+    """The states one piece farther on that are free."""
+    found: list[_States] = []
+    for move, (kind, sign) in enumerate(_MOVES):
+        rows = np.flatnonzero(states.move != (move ^ 1))  # not just back again
+        heading = states.heading[rows]
+        if kind == "S":
+            new = heading
+            moves = [
+                (share * sign * step * np.cos(heading), share * sign * step * np.sin(heading))
+                for share in (0.5, 1.0)
+            ]
+        else:
+            side = 1.0 if kind == "L" else -1.0
+            turns = [heading + side * sign * share * step / radius for share in (0.5, 1.0)]
+            new = turns[1]
+            moves = [
+                (
+                    side * radius * (np.sin(turn) - np.sin(heading)),
+                    -side * radius * (np.cos(turn) - np.cos(heading)),
+                )
+                for turn in turns
+            ]
+        x, y = states.x[rows], states.y[rows]
+        free = np.ones(len(rows), dtype=bool)
+        for dx, dy in moves[::-1]:
+            free[free] = space.holds_each(np.stack([(x + dx)[free], (y + dy)[free]], axis=1))
+        cost = states.cost[rows] + step + _changed(states, sign)[rows]
+        dx, dy = moves[1]
+        found.append(
+            _States(
+                (x + dx)[free],
+                (y + dy)[free],
+                new[free],
+                cost[free],
+                np.full(int(free.sum()), move),
+                rows[free],
+            )
+        )
+    return _States(
+        np.concatenate([block.x for block in found]),
+        np.concatenate([block.y for block in found]),
+        np.concatenate([block.heading for block in found]),
+        np.concatenate([block.cost for block in found]),
+        np.concatenate([block.move for block in found]),
+        np.concatenate([block.parent for block in found]),
+    )
+
+
+def _chosen(states: _States, known: set[int], step: float, promise: Array) -> Indices:
+    """Rows of states unlike those known so far, the most promising ones."""
+    size = step / 4
+    turn = np.round(states.heading / _TURN).astype(np.int64) % round(math.tau / _TURN)
+    x, y = (np.floor(values / size).astype(np.int64) for values in (states.x, states.y))
+    cells = ((x % 1_000_003) * 1_000_003 + y % 1_000_003) * 100 + turn * 2 + states.move % 2
+    chosen: list[int] = []
+    for row in np.argsort(np.round(states.cost + promise, 6), kind="stable").tolist():
+        cell = int(cells[row])
+        if cell not in known:
+            known.add(cell)
+            chosen.append(row)
+            if len(chosen) == _MOST_STATES:
+                break
+    return np.array(chosen, dtype=np.intp)

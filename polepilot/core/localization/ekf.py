@@ -1,12 +1,12 @@
 """Extended Kalman filter on the pose and on what distorts odometry, measurements and map.
 
 The states: x, y, heading; the relative error of the speed; the steering's offset; the errors of
-the servo's and the motors' time constants; the relative error of ranges; Legendre coefficients of
-the potentiometer's error over the pan range; and, for as many landmarks as `track_survey` was told,
-the error of their mapped positions. All but the pose change slowly or never. Estimating them is
-what brings the error from decimetres to centimetres (the paper's one-landmark correction never
-corrects the heading); the map's errors repeat in every sighting of a landmark, and a filter that
-took them for noise would become too sure of itself.
+the servo's and the motors' time constants, and of the time that the servo needs for a radian; the
+relative error of ranges; Legendre coefficients of the potentiometer's error over the pan range;
+and, for as many landmarks as `surveyed` names, the error of their mapped positions. All but the
+pose change slowly or never. Estimating them is what brings the error from decimetres to centimetres
+(the paper's one-landmark correction never corrects the heading); the map's errors repeat in every
+sighting of a landmark, and a filter that took them for noise would become too sure of itself.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from polepilot.core.geometry import Pose2D, wrap_angle
 from polepilot.core.landmark import Landmark
 from polepilot.core.localization.fix import Fix
 from polepilot.core.localization.noise import NoiseModel
-from polepilot.core.localization.odometry import OdometryHistory, Step
+from polepilot.core.localization.odometry import Following, OdometryHistory, Step
 from polepilot.core.localization.stretch import Distortions, drive
 from polepilot.core.observation import RangeBearing
 
@@ -34,7 +34,7 @@ _WIDE = (0.3, 0.3, math.radians(8.0))
 _NO_RANGE = 1e6
 """Variance of a range that was not measured, m²."""
 
-SPEED, STEERING, SERVO_LAG, MOTOR_LAG, RANGE, PAN = 3, 4, 5, 6, 7, 8
+SPEED, STEERING, SERVO_LAG, MOTOR_LAG, SLOWNESS, RANGE, PAN = 3, 4, 5, 6, 7, 8, 9
 PANS = 6
 STATES = PAN + PANS
 """States besides the map's errors."""
@@ -91,6 +91,7 @@ class PoseFilter:
             model.steering_prior,
             model.servo_lag_prior,
             model.motor_lag_prior,
+            model.slowness_prior,
             model.range_prior,
             *model.pan_priors,
             *(model.survey_sigma for _ in range(size - STATES)),
@@ -105,10 +106,11 @@ class PoseFilter:
         self.covariance[:3, 3:] = 0.0
         self.covariance[3:, :3] = 0.0
 
-    def retuned(self, motor: float, servo: float) -> None:
-        """The history's time constants were raised by so many seconds."""
-        self.state[MOTOR_LAG] -= motor
-        self.state[SERVO_LAG] -= servo
+    def retuned(self, by: Following) -> None:
+        """The history's constants were raised by so much."""
+        self.state[MOTOR_LAG] -= by.motor
+        self.state[SERVO_LAG] -= by.servo
+        self.state[SLOWNESS] -= by.slowness
 
     def copy(self) -> PoseFilter:
         other = PoseFilter.__new__(PoseFilter)
@@ -119,9 +121,10 @@ class PoseFilter:
         return other
 
     @property
-    def lag_errors(self) -> tuple[float, float]:
-        """True time constants of motors and servo minus the history's, seconds."""
-        return float(self.state[MOTOR_LAG]), float(self.state[SERVO_LAG])
+    def following_errors(self) -> Following:
+        """True constants of motors and servo minus the history's."""
+        servo, motor, slowness = self.state[SERVO_LAG : SLOWNESS + 1].tolist()
+        return Following(motor, servo, slowness)
 
     @property
     def speed_factor(self) -> float:
@@ -176,7 +179,7 @@ class PoseFilter:
         Returns how many seconds of it the robot moved.
         """
         state, noise = self.state, self.noise
-        heading, *wrong = state[2 : MOTOR_LAG + 1].tolist()
+        heading, *wrong = state[2 : SLOWNESS + 1].tolist()
         stretch = drive(heading, steps, Distortions(*wrong), noise, self.wheelbase)
         if stretch is None:
             return 0.0
@@ -196,7 +199,8 @@ class PoseFilter:
         """Compare a measurement with the state, which must have been predicted to its stamp."""
         noise = self.noise
         place = self._places.get(landmark.id)
-        x, y, heading, _, _, _, _, scale, *bends = self.state[:STATES].tolist()
+        x, y, heading = self.state[:3].tolist()
+        scale, *bends = self.state[RANGE:STATES].tolist()
         scale += 1.0
         arm_x = self.camera_forward * math.cos(heading)
         arm_y = self.camera_forward * math.sin(heading)

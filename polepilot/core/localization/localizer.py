@@ -24,7 +24,7 @@ from polepilot.core.localization.events import LocalizerEvent as LocalizerEvent
 from polepilot.core.localization.fix import Fix
 from polepilot.core.localization.health import LandmarkHealth, Verdict, place_of
 from polepilot.core.localization.noise import NoiseModel as NoiseModel
-from polepilot.core.localization.odometry import OdometryHistory
+from polepilot.core.localization.odometry import Following, OdometryHistory
 from polepilot.core.localization.presence import Presence
 from polepilot.core.localization.radial import RadialFilter, unfiltered
 from polepilot.core.localization.search import FixSearch
@@ -72,6 +72,7 @@ class Localizer:
             vehicle.wheelbase,
             steering_lag=self.settings.steering_lag,
             speed_lag=self.settings.speed_lag,
+            steering_slowness=self.settings.steering_slowness,
         )
         self._search = FixSearch(self._landmarks, self._history, camera_forward, self.settings.fix)
         self._health = LandmarkHealth(self._landmarks)
@@ -92,7 +93,7 @@ class Localizer:
             )
         )
         """What is known of the robot's errors outlives a pose."""
-        self._before: tuple[float, Filter, tuple[float, float]] | None = None
+        self._before: tuple[float, Filter, Following] | None = None
         self._track: Track | None = None
         self._ahead: Track | None = None
         self._given_up: Track | None = None
@@ -203,11 +204,11 @@ class Localizer:
         """Give up the pose and look for it anew; what contradicted the old one is kept."""
         track = self._track
         if self._before is not None and track is not None:
-            begun, tracked, lags = self._before
+            begun, tracked, following = self._before
             if track.stamp - begun < _PROBATION:
                 # A pose that did not last was wrong, and so is what was learnt from it.
                 self._filter = tracked
-                self._history.retune(*lags)
+                self._history.retune(following)
                 track = None
         self._given_up, self._agreeing = track, 0
         self._track = self._ahead = self._before = None
@@ -295,8 +296,7 @@ class Localizer:
             # The stricter gate left some of them out: they do not fit together so well.
             self._search.refuse("The landmarks seen so far do not fit together well enough.")
             return False
-        lags = (self._history.speed_lag, self._history.steering_lag)
-        self._before = (stamp, self._filter, lags)
+        self._before = (stamp, self._filter, self._history.following)
         self._accept(track, stamp, found.landmarks)
         self._trial.begin(found.landmarks)
         self._measured = (stamp, found.pose)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from polepilot.core.errors import InternalError
 from polepilot.core.geometry import Pose2D, wrap_angle
+from polepilot.core.localization.following import Followed, follow
 from polepilot.core.observation import Odometry
 
 _SMALL_TURN = 1e-3
@@ -111,32 +112,39 @@ class Step(NamedTuple):
     """How far the motors still were from the speed they were told, m/s."""
     speed_by_lag: float = 0.0
     """Derivative of ``speed`` by the motors' time constant, m/s²."""
+    by_slowness: float = 0.0
+    """Derivative of ``steering`` by the servo's slowness, rad²/s."""
+
+
+class Following(NamedTuple):
+    """How motors and servo follow what they are told, or by how much that is wrong."""
+
+    motor: float
+    """Time constant of the motors, seconds."""
+    servo: float
+    """Time constant of the servo, seconds."""
+    slowness: float = 0.0
+    """Seconds that the servo needs for a radian at least."""
+
+
+NO_LAGS = Following(0.0, 0.0)
+"""All is done at once."""
 
 
 class _Entry(NamedTuple):
     stamp: float
     speed: float
     steering: float
-    speed_then: float
+    speed_then: Followed
     """What the motors did at ``stamp``, while on the way to ``speed``."""
-    steering_then: float
-    lagged_speed_then: float
-    lagged_steering_then: float
-    """Both through their lag once more: what tells the effect of the lag."""
-
-
-class _Values(NamedTuple):
-    speed: float
-    steering: float
-    lagged_speed: float
-    lagged_steering: float
+    steering_then: Followed
 
 
 class OdometryHistory:
     """The last seconds of Odometry, with the servo's and the motors' lag; bounded in memory.
 
-    Motors and servo follow what they are told with first-order lags. The history answers how the
-    robot moved between any two moments of its span, so that a measurement which comes late is
+    Motors and servo follow what they are told (`following.py`). The history answers how the robot
+    moved between any two moments of its span, so that a measurement which comes late is
     applied at the pose from which it was made. Before the first entry the robot stood.
     """
 
@@ -146,14 +154,15 @@ class OdometryHistory:
         *,
         steering_lag: float = 0.0,
         speed_lag: float = 0.0,
+        steering_slowness: float = 0.0,
         span: float = 15.0,
         longest_step: float = 0.05,
     ) -> None:
-        if wheelbase <= 0 or steering_lag < 0 or speed_lag < 0 or span <= 0 or longest_step <= 0:
+        following = Following(speed_lag, steering_lag, steering_slowness)
+        if wheelbase <= 0 or min(following) < 0 or span <= 0 or longest_step <= 0:
             raise InternalError("an odometry history needs a positive wheelbase, span and step.")
         self.wheelbase = wheelbase
-        self._steering_lag = steering_lag
-        self._speed_lag = speed_lag
+        self._following = following
         self._span = span
         self._longest_step = longest_step
         self._entries: list[_Entry] = []
@@ -168,7 +177,7 @@ class OdometryHistory:
         if not (math.isfinite(stamp) and math.isfinite(speed) and math.isfinite(steering)):
             return
         if not self._entries:
-            self._push(_Entry(stamp, speed, steering, speed, steering, speed, steering))
+            self._push(_Entry(stamp, speed, steering, Followed(speed), Followed(steering)))
             return
         last = self._entries[-1]
         if stamp < last.stamp:
@@ -185,18 +194,13 @@ class OdometryHistory:
             del self._stamps[:keep]
 
     @property
-    def speed_lag(self) -> float:
-        """Time constant of the motors, seconds."""
-        return self._speed_lag
+    def following(self) -> Following:
+        """How motors and servo follow what they are told."""
+        return self._following
 
-    @property
-    def steering_lag(self) -> float:
-        """Time constant of the servo, seconds."""
-        return self._steering_lag
-
-    def retune(self, speed_lag: float, steering_lag: float) -> None:
-        """Other time constants, for the whole span."""
-        self._speed_lag, self._steering_lag = speed_lag, steering_lag
+    def retune(self, following: Following) -> None:
+        """Other constants, for the whole span."""
+        self._following = following
         for index in range(1, len(self._entries)):
             entry = self._entries[index]
             then = self._values(self._entries[index - 1], entry.stamp)
@@ -246,48 +250,32 @@ class OdometryHistory:
         self._stamps.append(entry.stamp)
 
     def _entry_steps(self, entry: _Entry, start: float, end: float) -> Iterator[Step]:
-        still = entry.speed == 0.0 and abs(entry.speed_then) < 1e-4
+        still = entry.speed == 0.0 and abs(entry.speed_then.value) < 1e-4
         count = 1 if still else max(1, math.ceil((end - start) / self._longest_step - 1e-9))
         dt = (end - start) / count
         if dt <= 0:
             return
         for index in range(count):
-            now = self._values(entry, start + (index + 0.5) * dt)
-            if abs(now.speed) < 1e-4:
-                yield Step(dt, 0.0, now.steering, 0.0)
+            speed, steering = self._values(entry, start + (index + 0.5) * dt)
+            if abs(speed.value) < 1e-4:
+                yield Step(dt, 0.0, steering.value, 0.0)
                 continue
             yield Step(
                 dt,
-                now.speed,
-                now.steering,
-                abs(entry.steering - now.steering),
-                _slope(now.lagged_steering - now.steering, self._steering_lag),
-                abs(entry.speed - now.speed),
-                _slope(now.lagged_speed - now.speed, self._speed_lag),
+                speed.value,
+                steering.value,
+                abs(entry.steering - steering.value),
+                steering.by_lag,
+                abs(entry.speed - speed.value),
+                speed.by_lag,
+                steering.by_slowness,
             )
 
-    def _values(self, entry: _Entry, stamp: float) -> _Values:
+    def _values(self, entry: _Entry, stamp: float) -> tuple[Followed, Followed]:
         """What motors and servo had reached at ``stamp``."""
         age = stamp - entry.stamp
-        speed, lagged_speed = _follow(
-            entry.speed, entry.speed_then, entry.lagged_speed_then, age, self._speed_lag
+        motor, servo, slowness = self._following
+        return (
+            follow(entry.speed, entry.speed_then, age, motor, 0.0),
+            follow(entry.steering, entry.steering_then, age, servo, slowness),
         )
-        steering, lagged_steering = _follow(
-            entry.steering, entry.steering_then, entry.lagged_steering_then, age, self._steering_lag
-        )
-        return _Values(speed, steering, lagged_speed, lagged_steering)
-
-
-def _follow(
-    told: float, value: float, lagged: float, age: float, lag: float
-) -> tuple[float, float]:
-    """A first-order lag after ``age`` seconds, and the same through the lag once more."""
-    if lag == 0 or (value == told and lagged == told):
-        return told, told
-    share = age / lag
-    left = math.exp(-share)
-    return told + (value - told) * left, told + (lagged - told + (value - told) * share) * left
-
-
-def _slope(difference: float, lag: float) -> float:
-    return difference / lag if lag > 0 else 0.0

@@ -21,7 +21,13 @@ from polepilot.core.geometry import Pose2D, wrap_angle
 from polepilot.core.landmark import Landmark
 from polepilot.core.localization.fix import Fix
 from polepilot.core.localization.kalman import AxisFilter
-from polepilot.core.localization.odometry import OdometryHistory, Step, advance
+from polepilot.core.localization.odometry import (
+    NO_LAGS,
+    Following,
+    OdometryHistory,
+    Step,
+    advance,
+)
 from polepilot.core.observation import RangeBearing
 
 _POSITION_PER_METRE = 0.06
@@ -66,12 +72,12 @@ class RadialFilter:
     heading_variance: float = 1.0
 
     @property
-    def lag_errors(self) -> tuple[float, float]:
+    def following_errors(self) -> Following:
         """The paper knows of no lags."""
-        return 0.0, 0.0
+        return NO_LAGS
 
-    def retuned(self, motor: float, servo: float) -> None:
-        """The history's time constants were raised by so many seconds: no matter here."""
+    def retuned(self, by: Following) -> None:
+        """The history's constants were raised by so much: no matter here."""
 
     def begin(
         self,

@@ -28,6 +28,8 @@ class Distortions(NamedTuple):
     servo: float
     """Errors of the servo's and the motors' time constants, seconds."""
     motor: float
+    slowness: float = 0.0
+    """Error of the servo's slowness, seconds per radian."""
 
 
 class Stretch(NamedTuple):
@@ -38,7 +40,7 @@ class Stretch(NamedTuple):
     dy: float
     turn: float
     jacobian: Array
-    """3 x 7: derivative of the pose at the end by the pose at the start and by the distortions."""
+    """3 x 8: derivative of the pose at the end by the pose at the start and by the distortions."""
     noise: Array
     """3 x 3 covariance of what the steps add."""
     moving: float
@@ -56,6 +58,7 @@ def drive(
     way_x = way_y = way_turn = moving = 0.0
     # Derivatives of the pose by the distortions.
     vx = vy = vh = ox = oy = oh = sx = sy = sh = mx = my = mh = 0.0
+    wx = wy = wh = 0.0
     xx = xy = xh = yy = yh = hh = 0.0
     speed_density, steering_density = model.speed_noise**2, model.steering_noise**2
     skid_density = model.skid**2
@@ -66,7 +69,8 @@ def drive(
             continue
         moving += dt
         raw = told + step.speed_by_lag * wrong.motor
-        tan = math.tan(step.steering + wrong.steering + step.by_lag * wrong.servo)
+        angle = step.steering + wrong.steering + step.by_lag * wrong.servo
+        tan = math.tan(angle + step.by_slowness * wrong.slowness)
         curvature = tan / wheelbase
         distance = raw * factor * dt
         dx, dy, turn, ax, ay, bx, by = arc(heading + way_turn, distance, curvature)
@@ -82,6 +86,8 @@ def drive(
         vx, vy, vh = vx - vh * dy + gx, vy + vh * dx + gy, vh + gh
         ox, oy, oh = ox - oh * dy + cx, oy + oh * dx + cy, oh + ch
         sx, sy, sh = sx - sh * dy + cx * lag_s, sy + sh * dx + cy * lag_s, sh + ch * lag_s
+        lag_w = step.by_slowness
+        wx, wy, wh = wx - wh * dy + cx * lag_w, wy + wh * dx + cy * lag_w, wh + ch * lag_w
         mx, my, mh = mx - mh * dy + ax * lag_m, my + mh * dx + ay * lag_m, mh + curvature * lag_m
         # The noise so far turns with the heading's error; then comes that of this step.
         xx, xy, yy = (
@@ -105,9 +111,9 @@ def drive(
         return None
     jacobian = np.array(
         (
-            (1.0, 0.0, -way_y, vx, ox, sx, mx),
-            (0.0, 1.0, way_x, vy, oy, sy, my),
-            (0.0, 0.0, 1.0, vh, oh, sh, mh),
+            (1.0, 0.0, -way_y, vx, ox, sx, mx, wx),
+            (0.0, 1.0, way_x, vy, oy, sy, my, wy),
+            (0.0, 0.0, 1.0, vh, oh, sh, mh, wh),
         )
     )
     noise = np.array(((xx, xy, xh), (xy, yy, yh), (xh, yh, hh)))

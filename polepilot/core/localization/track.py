@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 from polepilot.core.geometry import Pose2D
 from polepilot.core.landmark import Landmark
 from polepilot.core.localization.fix import Fix
-from polepilot.core.localization.odometry import OdometryHistory, Step
+from polepilot.core.localization.odometry import Following, OdometryHistory, Step
 from polepilot.core.observation import RangeBearing
 
 Sighting = tuple[RangeBearing, Landmark]
 _KEPT = 24
 """So many pictures can be gone back at most."""
-_LAG_STEP = 0.01
-"""The time constants are followed in steps of this, seconds, and within these limits."""
-_SHORTEST_LAG, _LONGEST_LAG = 0.01, 0.5
+_STEPS = Following(0.01, 0.01, 0.01)
+"""The constants of motors and servo are followed in steps of this, and within these limits."""
+_LEAST, _MOST = Following(0.01, 0.01, 0.08), Following(0.5, 0.5, 1.0)
 
 
 class Filter(Protocol):
@@ -39,8 +39,8 @@ class Filter(Protocol):
     @property
     def steering_offset(self) -> float: ...
     @property
-    def lag_errors(self) -> tuple[float, float]: ...
-    def retuned(self, motor: float, servo: float) -> None: ...
+    def following_errors(self) -> Following: ...
+    def retuned(self, by: Following) -> None: ...
     def begin(
         self, found: Fix, stamp: float, sightings: Sequence[Sighting], history: OdometryHistory
     ) -> float: ...
@@ -104,18 +104,21 @@ class Track:
 
     def retune(self, history: OdometryHistory) -> None:
         """Let the history follow what the filter has learnt of servo and motors."""
-        errors = self.filter.lag_errors
-        if max(abs(errors[0]), abs(errors[1])) < _LAG_STEP:
+        errors = self.filter.following_errors
+        if all(abs(error) < step for error, step in zip(errors, _STEPS, strict=True)):
             return
-        before = (history.speed_lag, history.steering_lag)
-        motor, servo = (
-            min(max(lag + error, _SHORTEST_LAG), _LONGEST_LAG)
-            for lag, error in zip(before, errors, strict=True)
+        before = history.following
+        after = Following(
+            *(
+                min(max(value + error, least), most)
+                for value, error, least, most in zip(before, errors, _LEAST, _MOST, strict=True)
+            )
         )
-        if max(abs(motor - before[0]), abs(servo - before[1])) > 0.5 * _LAG_STEP:
-            history.retune(motor, servo)
-            self.filter.retuned(motor - before[0], servo - before[1])
-            # What was kept belongs to the old time constants.
+        by = Following(*(new - old for new, old in zip(after, before, strict=True)))
+        if any(abs(change) > 0.5 * step for change, step in zip(by, _STEPS, strict=True)):
+            history.retune(after)
+            self.filter.retuned(by)
+            # What was kept belongs to the old constants.
             self._moments.clear()
 
     def rewind(self, stamp: float, history: OdometryHistory) -> list[_Moment] | None:

@@ -16,7 +16,7 @@ import numpy as np
 from polepilot.core.errors import DatasetError, ImageError
 from polepilot.core.geometry import Pose2D, wrap_angle
 from polepilot.core.localization.localizer import Localizer, LocalizerEvent, LocalizerSettings
-from polepilot.core.localization.odometry import OdometryHistory
+from polepilot.core.localization.odometry import NO_LAGS, Following, OdometryHistory
 from polepilot.core.observation import (
     Detection,
     Odometry,
@@ -57,8 +57,8 @@ class ReplayResult:
     """Which estimates are the first ones after the pose was found, or found anew."""
     moved: frozenset[int] = frozenset()
     """Landmarks that do not stand where the map has them."""
-    lags: tuple[float, float] = (0.0, 0.0)
-    """Time constants of motors and servo, as far as they were learnt, seconds."""
+    following: Following = NO_LAGS
+    """How motors and servo follow what they are told, as far as that was learnt."""
     refusal: str = ""
     """Why there is no pose at all, for a person; empty where there is one."""
 
@@ -188,7 +188,7 @@ def replay(
         if progress is not None:
             progress(result.frames)
     result.moved = frozenset(localizer.moved_landmarks)
-    result.lags = (localizer.history.speed_lag, localizer.history.steering_lag)
+    result.following = localizer.history.following
     if not result.estimates:
         result.refusal = localizer.reason
     return result
@@ -202,9 +202,13 @@ def smooth(dataset: Dataset, result: ReplayResult) -> list[tuple[float, Pose2D]]
     """
     settings = dataset.settings
     half_range = max(abs(dataset.pan_minimum), abs(dataset.pan_maximum))
-    motors, servo = result.lags
+    motors, servo, slowness = result.following
     history = OdometryHistory(
-        dataset.vehicle.wheelbase, speed_lag=motors, steering_lag=servo, span=math.inf
+        dataset.vehicle.wheelbase,
+        speed_lag=motors,
+        steering_lag=servo,
+        steering_slowness=slowness,
+        span=math.inf,
     )
     for sample in dataset.samples:
         if isinstance(sample, Odometry):

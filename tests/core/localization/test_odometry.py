@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from polepilot.core.geometry import Pose2D, wrap_angle
 from polepilot.core.localization.odometry import (
+    Following,
     OdometryHistory,
     advance,
     advance_with_jacobians,
@@ -149,23 +150,51 @@ def test_history_models_the_servo() -> None:
 COMMANDS = [(0.0, 0.0), (0.5, 0.3), (0.2, -0.2), (0.6, 0.1), (0.4, 0.4)]
 
 
-def lagging(lag: float) -> OdometryHistory:
-    history = OdometryHistory(0.2, steering_lag=lag, speed_lag=2 * lag)
+def lagging(lag: float, slowness: float) -> OdometryHistory:
+    history = OdometryHistory(
+        0.2, steering_lag=lag, speed_lag=2 * lag, steering_slowness=slowness, longest_step=0.01
+    )
     for index, (speed, angle) in enumerate(COMMANDS):
         history.add(Odometry(0.15 * index, speed, angle))
     return history
 
 
-def test_the_effect_of_the_lags_matches_differences() -> None:
-    history = lagging(0.3)
-    history.retune(0.2, 0.1)
+@pytest.mark.parametrize("slowness", [0.0, 0.3, 0.45])
+def test_the_effect_of_lags_and_slowness_matches_differences(slowness: float) -> None:
+    history = lagging(0.3, 0.1)
+    history.retune(Following(0.2, 0.1, slowness))
     steps = list(history.steps(0.15, 0.9))
-    same, low, high = (list(lagging(x).steps(0.15, 0.9)) for x in (0.1, 0.1 - 1e-5, 0.1 + 1e-5))
+    same, low, high = (
+        list(lagging(x, slowness).steps(0.15, 0.9)) for x in (0.1, 0.1 - 1e-5, 0.1 + 1e-5)
+    )
     assert [s.steering for s in steps] == pytest.approx([s.steering for s in same])
     assert [s.speed for s in steps] == pytest.approx([s.speed for s in same])
     for step, a, b in zip(steps, low, high, strict=True):
-        assert step.by_lag == pytest.approx((b.steering - a.steering) / 2e-5, abs=1e-4)
+        assert step.by_lag == pytest.approx((b.steering - a.steering) / 2e-5, abs=1e-3)
         assert step.speed_by_lag == pytest.approx((b.speed - a.speed) / 4e-5, abs=1e-4)
+    if slowness:
+        low, high = (
+            list(lagging(0.1, x).steps(0.15, 0.9)) for x in (slowness - 1e-5, slowness + 1e-5)
+        )
+        slopes = [(b.steering - a.steering) / 2e-5 for a, b in zip(low, high, strict=True)]
+        assert [s.by_slowness for s in steps] == pytest.approx(slopes, abs=1e-3)
+        assert max(map(abs, slopes)) > 0.1
+
+
+def test_a_slow_servo_needs_its_time() -> None:
+    """Against an integration in small steps."""
+    history = OdometryHistory(0.2, steering_lag=0.1, steering_slowness=1 / 3, longest_step=0.01)
+    history.add(Odometry(0.0, 0.3, 0.5))
+    history.add(Odometry(1.0, 0.3, -0.5))
+    angle, small = 0.5, 1e-4
+    reached = []
+    for _ in range(10_000):
+        angle += min(max((-0.5 - angle) / 0.1, -3.0), 3.0) * small
+        reached.append(angle)
+    steps = list(history.steps(1.0, 2.0))
+    told = [reached[round((0.01 * index + 0.005) / small) - 1] for index in range(100)]
+    assert [step.steering for step in steps] == pytest.approx(told, abs=2e-3)
+    assert abs(steps[10].steering - (0.5 - 3.0 * 0.105)) < 1e-9
 
 
 def test_history_is_bounded_and_ignores_nonsense() -> None:

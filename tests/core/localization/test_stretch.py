@@ -22,6 +22,7 @@ STEPS = st.lists(
         st.floats(-1.0, 1.0),
         st.floats(0.0, 0.2),
         st.floats(-1.0, 1.0),
+        st.floats(-1.0, 1.0),
     ),
     min_size=1,
     max_size=6,
@@ -30,6 +31,7 @@ WRONG = st.builds(
     Distortions,
     st.floats(-0.05, 0.05),
     st.floats(-0.03, 0.03),
+    st.floats(-0.05, 0.05),
     st.floats(-0.05, 0.05),
     st.floats(-0.05, 0.05),
 )
@@ -44,6 +46,7 @@ def driven(heading: float, steps: list[Step], wrong: Distortions) -> np.ndarray:
             continue
         speed = (step.speed + step.speed_by_lag * wrong.motor) * (1 + wrong.speed)
         steering = step.steering + wrong.steering + step.by_lag * wrong.servo
+        steering += step.by_slowness * wrong.slowness
         moved = advance(Pose2D(pose.x, pose.y, heading + turned), speed, steering, step.dt, 0.2)
         turned += speed * step.dt * np.tan(steering) / 0.2
         pose = moved
@@ -61,7 +64,7 @@ def test_a_stretch_is_its_steps(heading: float, steps: list[Step], wrong: Distor
     assert (stretch.dx, stretch.dy, stretch.turn) == pytest.approx(expected, abs=1e-9)
     assert stretch.moving == pytest.approx(sum(s.dt for s in steps if s.speed))
     small = 1e-6
-    for column in range(4):
+    for column in range(5):
         high, low = list(wrong), list(wrong)
         high[column] += small
         low[column] -= small

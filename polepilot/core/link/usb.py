@@ -7,11 +7,16 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
+import grp
 import os
+import pwd
+import termios
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import serial
 from serial.tools import list_ports
@@ -22,6 +27,7 @@ from polepilot.core.link.report import Chunk
 
 _RETRY_PERIOD = 1.0
 """Between two attempts to open, seconds."""
+_RULE = "install the udev rule deploy/99-polepilot.rules and plug it in again"
 _MAX_UNSENT = 1024
 """Bytes that the device did not take. Beyond that it takes nothing: old commands are dropped."""
 
@@ -194,6 +200,7 @@ class SerialPort:
         except (OSError, serial.SerialException, ValueError) as error:
             self._complain(*_explain(path, error))
             return
+        _claim(int(self._device.fileno()), path)
         self._listener = Listener(
             int(self._device.fileno()), self._clock, partial(_alive, self._device)
         )
@@ -232,8 +239,7 @@ def _explain(path: str, error: Exception) -> tuple[str, str]:
     if code in (errno.EACCES, errno.EPERM):
         return (
             f"No permission to open {path}.",
-            "Add yourself to the group that owns it (sudo usermod -aG dialout $USER) and log in "
-            "again, or install the udev rule from deploy/.",
+            _permission(path),
         )
     if code in (errno.EBUSY, errno.EAGAIN):
         return (
@@ -244,6 +250,43 @@ def _explain(path: str, error: Exception) -> tuple[str, str]:
     if code in (None, errno.ENOTTY, errno.EINVAL):
         return f"{path} is no serial device ({error}).", _plugged_in()
     return f"Cannot open {path}: {error}.", "Check the cable and the path in robot.toml."
+
+
+def _claim(descriptor: int, path: str) -> None:
+    """Keep out programs that heed no lock: from now on the kernel refuses to open it once more.
+
+    Not for a pseudo-terminal: there the mark would outlive a program that is killed.
+    """
+    if not _is_pseudo(path):
+        with contextlib.suppress(OSError):
+            fcntl.ioctl(descriptor, termios.TIOCEXCL)
+
+
+def _is_pseudo(path: str) -> bool:
+    return os.path.realpath(path).startswith("/dev/pts/")
+
+
+def _permission(path: str) -> str:
+    """Who may open ``path``, and how to become one of them."""
+    try:
+        status = Path(path).stat()
+        group = grp.getgrgid(status.st_gid)
+        user = pwd.getpwuid(os.getuid()).pw_name
+    except (OSError, KeyError):
+        return f"Add yourself to its group (sudo usermod -aG dialout $USER), or {_RULE}."
+    return _advice(status.st_mode, group, user, {os.getgid(), *os.getgroups()})
+
+
+def _advice(mode: int, group: grp.struct_group, user: str, groups: set[int]) -> str:
+    """For a device of ``group``, and a ``user`` whose session has these ``groups``."""
+    if group.gr_gid == 0 or mode & 0o060 != 0o060:
+        return f"It belongs to its owner alone: {_RULE}, which gives it to the group dialout."
+    if user in group.gr_mem and group.gr_gid not in groups:
+        return f"You are in its group {group.gr_name}, but this session is older: log in again."
+    return (
+        f"Add yourself to its group (sudo usermod -aG {group.gr_name} {user}) and log in again, or "
+        f"{_RULE}."
+    )
 
 
 def _plugged_in() -> str:

@@ -304,12 +304,14 @@ class Workbench:
             return LinkError(
                 "The port is open and silent: nothing is connected there, the board has no power, "
                 "or it holds no firmware of ours.",
+                remedy="See docs/hardware.md.",
                 code="link_silent",
             )
         if seen.received == 0:
             return LinkError(
                 f"What is connected there sends {self._bytes} bytes that are no packets: another "
                 "device, or another baud rate.",
+                remedy="link.baud_rate is 250000 for Arduino boards, 115200 for the PIC.",
                 code="link_foreign",
             )
         return LinkError(

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+import grp
 import os
+import subprocess
+import sys
 import threading
 import time
 import tty
@@ -170,7 +174,7 @@ def test_a_file_is_no_serial_device(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("code", "text"),
-    [(13, "usermod -aG dialout"), (16, "ModemManager"), (2, "Check the cable")],
+    [(13, "dialout"), (16, "ModemManager"), (2, "Check the cable")],
 )
 def test_errors_say_what_to_do(
     monkeypatch: pytest.MonkeyPatch, plug: Plug, code: int, text: str
@@ -182,6 +186,46 @@ def test_errors_say_what_to_do(
     with pytest.raises(LinkError) as told:
         SerialPort(PortAddress(path=str(plug.path))).read()
     assert text in told.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("mode", "members", "groups", "text"),
+    [
+        (0o660, [], {100}, "sudo usermod -aG dialout ann) and log in again"),
+        (0o660, ["ann"], {100}, "this session is older: log in again"),
+        (0o660, ["ann"], {100, 20}, "install the udev rule"),
+        (0o600, ["ann"], {100}, "belongs to its owner alone: install the udev rule"),
+    ],
+)
+def test_permission_is_explained_by_who_owns_it(
+    mode: int, members: list[str], groups: set[int], text: str
+) -> None:
+    dialout = grp.struct_group(("dialout", "x", 20, members))
+    assert text in usb._advice(mode, dialout, "ann", groups)
+
+
+def test_the_kernel_keeps_others_out(plug: Plug, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Programs that heed no lock as well; root may always."""
+    monkeypatch.setattr(usb, "_is_pseudo", lambda _: False)
+    device = plug.path.resolve()
+    device.chmod(0o666)
+    port = SerialPort(PortAddress(path=str(plug.path)))
+
+    def opens() -> bool:
+        script = (
+            "import os, sys\n"
+            "if os.getuid() == 0: os.setgroups([]); os.setgid(65534); os.setuid(65534)\n"
+            "try: os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)\n"
+            "except OSError as error: sys.exit(error.errno)\n"
+        )
+        done = subprocess.run([sys.executable, "-I", "-c", script, device], check=False)
+        assert done.returncode in (0, errno.EBUSY)
+        return done.returncode == 0
+
+    assert opens()
+    port.read()
+    assert not opens()
+    port.close()
 
 
 class FakePort:
@@ -276,6 +320,41 @@ def test_a_board_on_a_real_port_is_connected_armed_stopped_and_replugged(plug: P
         link.estop()
         run(link, port, LinkState.ESTOP)
         assert link.statistics.handshakes == 2
+    finally:
+        board.stop()
+        port.close()
+
+
+def test_after_replugging_nothing_is_armed_by_itself(plug: Plug) -> None:
+    """An owner who goes on to ask for motion finds a board that stands."""
+    port = SerialPort(PortAddress(path=str(plug.path)))
+    link = HostLink()
+    board = BoardThread(plug)
+    try:
+        run(link, port, LinkState.IDLE)
+        link.arm()
+        run(link, port, LinkState.ARMED)
+        link.drive(500, 500, 0)
+        link.arm()  # on its way when the cable is pulled
+    finally:
+        board.stop()
+    plug.remove()
+    run(link, port, LinkState.CLOSED)
+    link.drive(500, 500, 0)
+    plug.insert()
+    board = BoardThread(plug)
+    try:
+        run(link, port, LinkState.IDLE)
+        end = time.monotonic() + 0.5
+        while time.monotonic() < end:
+            link.drive(500, 500, 0)
+            for chunk in port.read():
+                link.receive(chunk.data, chunk.stamp)
+            port.write(link.poll(time.monotonic()))
+            assert link.state is LinkState.IDLE
+            assert board.board.outputs.left == 0
+            time.sleep(0.005)
+        assert not board.board.executed
     finally:
         board.stop()
         port.close()

@@ -25,11 +25,15 @@ class Scripted:
     def __init__(self, answers: Sequence[tuple[str, Answer]]) -> None:
         self.answers = list(answers)
         self.said: list[str] = []
+        self.shown: list[str] = []
         self.asked: list[str] = []
         self._stop_in: int | None = None
 
     def say(self, text: str) -> None:
         self.said.append(text)
+
+    def show(self, text: str) -> None:
+        self.shown.append(text)
 
     def ask(self, question: str) -> str:
         self.asked.append(question)

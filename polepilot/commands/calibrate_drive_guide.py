@@ -288,7 +288,7 @@ class Guide:
         ask = self._person
         while True:
             self._lift()
-            self._want(f"May it drive {how}? (about {seconds:.1f} s)")
+            self._want(f"Robot on its line, way free? May it drive {how}? (about {seconds:.1f} s)")
             odometer = self._bench.latest.telemetry.odometer
             motion = self._motion(
                 lambda: self._bench.drive(

@@ -43,7 +43,7 @@ def try_inputs(checks: LinkDoctor, person: Person) -> None:
                 person,
                 f"proximity {name}",
                 f"Hold your hand 15 cm in front of the {name} sensor alone.",
-                lambda checks, index=index: _proximity(checks, index),  # type: ignore[misc]
+                lambda checks, person, index=index: _proximity(checks, person, index),  # type: ignore[misc]
             )
     _release(checks, person)
 
@@ -90,19 +90,20 @@ def _try(
     person: Person,
     name: str,
     request: str,
-    seen: Callable[[LinkDoctor], str],
+    seen: Callable[[LinkDoctor, Person], str],
 ) -> None:
     if person.ask(f"{request} [Enter/s]").lower().startswith("s"):
         checks.note(name, "skipped", "not tried")
         return
-    found = seen(checks)
+    found = seen(checks, person)
+    person.show("")
     if found:
         checks.note(name, "good", found)
     else:
         checks.note(name, "bad", f"nothing was noticed within {_PATIENCE:.0f} s: check its wires")
 
 
-def _button(checks: LinkDoctor) -> str:
+def _button(checks: LinkDoctor, _: Person) -> str:
     bench = checks.bench
 
     def pressed() -> bool:
@@ -115,20 +116,23 @@ def _button(checks: LinkDoctor) -> str:
     return "stops the board" if bench.state is LinkState.ESTOP else ""
 
 
-def _potentiometer(checks: LinkDoctor) -> str:
+def _potentiometer(checks: LinkDoctor, person: Person) -> str:
     low = high = checks.telemetry.pan_adc
 
     def both_ways() -> bool:
         nonlocal low, high
-        low, high = min(low, checks.telemetry.pan_adc), max(high, checks.telemetry.pan_adc)
+        now = checks.telemetry.pan_adc
+        low, high = min(low, now), max(high, now)
+        person.show(f"  {checks.pan_in_words(now)}; so far from {low} to {high}")
         return high - low >= 2 * _TURNED
 
     checks.bench.watch(_PATIENCE, both_ways)
     return f"from {low} to {high} counts" if high - low >= 2 * _TURNED else ""
 
 
-def _proximity(checks: LinkDoctor, index: int) -> str:
+def _proximity(checks: LinkDoctor, person: Person, index: int) -> str:
     def near() -> bool:
+        person.show(f"  sees {checks.telemetry.proximity_mm[index] / 10:.0f} cm")
         return checks.telemetry.proximity_mm[index] < _NEAR_MM
 
     checks.bench.watch(_PATIENCE, near)

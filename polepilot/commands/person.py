@@ -19,6 +19,10 @@ class Person(Protocol):
 
     def say(self, text: str) -> None: ...
 
+    def show(self, text: str) -> None:
+        """Something that changes, in one line; an empty text ends it."""
+        ...
+
     def ask(self, question: str) -> str:
         """The answer, without spaces around it.
 
@@ -42,6 +46,10 @@ class Terminal:
 
     def say(self, text: str) -> None:
         sys.stderr.write(text + "\n")
+        sys.stderr.flush()
+
+    def show(self, text: str) -> None:
+        sys.stderr.write(f"\r\x1b[K{text}")
         sys.stderr.flush()
 
     def ask(self, question: str) -> str:

@@ -189,6 +189,7 @@ def test_inputs_are_tried_by_hand(good: bool) -> None:
     for name in names:
         assert found(doctor, name)[0] == ("good" if good else "bad"), name
     assert rig.most == 0
+    assert any("so far from" in text for text in somebody.shown)
     if good:
         assert found(doctor, "release") == ("good", "the stop has ended")
 

@@ -73,7 +73,7 @@ class Workbench:
         self._port = port
         self._clock = clock
         self._pressed: Callable[[], bool] = lambda: False
-        self._link = HostLink(replace(LinkSettings(), ping_period=0.1))
+        self._link = HostLink(replace(LinkSettings(), ping_period=0.05))
         self._generation = -1
         self._bytes = 0
         self._events: list[LinkEvent] = []

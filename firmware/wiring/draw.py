@@ -120,7 +120,7 @@ def _inputs(sheet: Sheet, board: Wiring) -> None:
     sheet.text(x + 14, top + 44, "100 nF from the", size=12, color=SOFT)
     sheet.text(x + 14, top + 61, "middle to ground", size=12, color=SOFT)
     y = top + 74
-    sheet.supply(230, y - 38, "12 V", MOTOR)
+    sheet.supply(230, y - 38, "12 V", INK)
     sheet.resistor(230, y - 22, "20 kΩ")
     sheet.line((230, y - 6), (230, y + 6))
     sheet.resistor(230, y + 22, "10 kΩ")
@@ -225,7 +225,7 @@ def power_sheet() -> Sheet:
     rail, motors, low = 180.0, 180.0, 560.0
     # Battery, fuse, main switch.
     x = 100.0
-    sheet.line((x, rail + 90), (x, rail), (150, rail), color=MOTOR, width=2.4)
+    sheet.line((x, rail + 90), (x, rail), (150, rail), color=INK, width=2.4)
     sheet.line((x - 22, rail + 90), (x + 22, rail + 90), width=2)
     sheet.line((x - 11, rail + 102), (x + 11, rail + 102), width=4)
     sheet.line((x - 22, rail + 114), (x + 22, rail + 114), width=2)
@@ -235,13 +235,13 @@ def power_sheet() -> Sheet:
     sheet.text(x + 32, rail + 122, "12 V, lead, or 3S lithium", size=12, color=SOFT)
     sheet.text(x + 32, rail + 138, "with a protection board", size=12, color=SOFT)
     sheet.box(150, rail - 9, 52, 18, fill=PAPER, color=INK, radius=2)
-    sheet.line((150, rail), (202, rail), color=MOTOR, width=2)
+    sheet.line((150, rail), (202, rail), color=INK, width=2)
     sheet.text(176, rail - 20, "F1 7.5 A", size=12, anchor="middle", weight=600)
     sheet.text(176, rail + 28, "at the battery", size=11, color=SOFT, anchor="middle")
-    sheet.line((202, rail), (270, rail), color=MOTOR, width=2.4)
+    sheet.line((202, rail), (270, rail), color=INK, width=2.4)
     sheet.closer(290, rail)
     sheet.text(290, rail - 26, "S1 main switch", size=12, anchor="middle", weight=600)
-    sheet.line((310, rail), (640, rail), color=MOTOR, width=2.4)
+    sheet.line((310, rail), (640, rail), color=INK, width=2.4)
 
     # Ground.
     sheet.line((x, low), (1020, low), width=2.4)
@@ -251,8 +251,8 @@ def power_sheet() -> Sheet:
     sheet.text(1020, low + 22, "ground", size=12, color=SOFT, anchor="end")
 
     # Logic: before the stop.
-    sheet.dot(370, rail, MOTOR)
-    sheet.line((370, rail), (370, 300), color=MOTOR, width=2)
+    sheet.dot(370, rail)
+    sheet.line((370, rail), (370, 300), color=INK, width=2)
     sheet.box(320, 300, 100, 62)
     sheet.text(370, 326, "5 V, 3 A", anchor="middle", weight=600)
     sheet.text(370, 344, "step-down", size=12, color=SOFT, anchor="middle")
@@ -265,7 +265,7 @@ def power_sheet() -> Sheet:
     sheet.dot(370, low)
 
     # The coil of K1 through the first contact of S2.
-    sheet.dot(530, rail, MOTOR)
+    sheet.dot(530, rail)
     sheet.line((530, rail), (530, 250), color=STOP, width=2)
     sheet.line((530, 250), (530, 264), (552, 264), color=STOP, width=2)
     sheet.opener(572, 264)
@@ -288,7 +288,7 @@ def power_sheet() -> Sheet:
     # Its contact in the motors' supply.
     sheet.closer(660, motors, STOP)
     sheet.line(
-        (660, motors - 6), (660, 130), (452, 130), (452, 389), (590, 389), dashed=True, color=SOFT
+        (660, motors - 6), (660, 130), (436, 130), (436, 389), (590, 389), dashed=True, color=SOFT
     )
     sheet.text(660, motors + 26, "K1, 30 A", size=12, anchor="middle", weight=600)
     sheet.line((680, motors), (1020, motors), color=MOTOR, width=2.4)

@@ -20,6 +20,7 @@
 #define TILT 0.2        /* by so many more segments up or down each */
 #define LEVEL_TILTS 1   /* of them what is seen at one side only may have */
 #define SAME_BOTH 0.015 /* of bright - dark: how much one thing differs on the pole and beside, */
+#define SAME_SHARE 0.03 /* or of how much it stands out, if that is more */
 #define SAME_ONE 0.02
 #define SAME_NOISE 0.2  /* times the fit's rest, more; */
 #define UNLIKE 5.0      /* times as much of SAME_ONE says nothing any more */
@@ -181,7 +182,7 @@ static double goes_on(const scene *s, int i, int from, int to)
             if (!look_beside(s, way, i, from, to, TILT * k, UNLIKE * one, &unlike, &out) ||
                 out < STANDS_OUT)
                 continue;
-            same[way][k + TILTS] = unlike < both && out > 3 * both;
+            same[way][k + TILTS] = unlike < fmax(both, SAME_SHARE * out) && out > 3 * both;
             if (abs(k) <= LEVEL_TILTS)
                 most = fmax(most, fmin(out / STANDS_OUT_ONE, 1) * one / fmax(unlike, one / 2));
         }
@@ -213,7 +214,7 @@ static double other_black(const scene *s, int i)
  * which the paint is darkest, bright and dark segments have the same sides. */
 static double swells(const scene *s, const eye_task *task, int i, int from, int to)
 {
-    double width[EYE_MOST_SEGMENTS], values[EYE_MOST_SEGMENTS], most = 0;
+    double width[EYE_MOST_SEGMENTS], values[EYE_MOST_SEGMENTS], both = 0;
     double trim = eye_limit(0.5 - 0.6 / s->scale->unit, 0.1, 0.3);
     if (s->channels != 3 || task->low < 0)
         return 0;
@@ -238,9 +239,9 @@ static double swells(const scene *s, const eye_task *task, int i, int from, int 
         for (int k = 0; k < s->segments; k++)
             if ((k < from || k >= to) && !isnan(width[k]))
                 elsewhere = fmax(elsewhere, fabs(width[k] - usual));
-        most = fmax(most, (width[i] - usual) / fmax(SWELLS, SWELLS_SPREAD * elsewhere));
+        both += at_most((width[i] - usual) / fmax(SWELLS, SWELLS_SPREAD * elsewhere));
     }
-    return at_most(most);
+    return both;
 }
 
 /* The brightness of the dark rows, off the bright segments' edges, in the run from ``from`` to ``to`` or
@@ -330,7 +331,7 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
             to++;
         double evidence = goes_on(&s, i, from, to) + other_black(&s, i) +
                           (rows ? step(&s, u, from, to) : 0);
-        if (evidence <= ENOUGH && evidence + MOST_OF_ONE > ENOUGH)
+        if (evidence <= ENOUGH)
             evidence += swells(&s, task, i, from, to);
         if (evidence > ENOUGH)
             return 1;

@@ -57,6 +57,8 @@ typedef struct {
     double dark[EYE_LIGHTS], bright[EYE_LIGHTS], contrast;
     double black, usual; /* brightness of the dark rows: the middle one and how far others are from it */
     margin beside[2];
+    double width[2][EYE_MOST_SEGMENTS], straight[2]; /* how far a side stands out, and usually does, */
+    int shows[2];                                    /* if it is to be seen */
 } scene;
 
 static double row_of(const scene *s, double place)
@@ -210,17 +212,14 @@ static double other_black(const scene *s, int i)
     return at_most(off / (OTHER_BLACK + OTHER_SPREAD * spread));
 }
 
-/* Whether a side stands out where the bit is, and at no bright segment: evidence. In the channel in
- * which the paint is darkest, bright and dark segments have the same sides. */
-static double swells(const scene *s, const eye_task *task, int i, int from, int to)
+/* How far each side stands out at every segment. In the channel in which the paint is darkest, bright
+ * and dark segments have the same sides. */
+static void know_sides(scene *s, const eye_task *task)
 {
-    double width[EYE_MOST_SEGMENTS], values[EYE_MOST_SEGMENTS], both = 0;
-    double trim = eye_limit(0.5 - 0.6 / s->scale->unit, 0.1, 0.3);
-    if (s->channels != 3 || task->low < 0)
-        return 0;
+    double values[EYE_MOST_SEGMENTS], trim = eye_limit(0.5 - 0.6 / s->scale->unit, 0.1, 0.3);
     for (int way = 0; way < 2; way++) {
+        double *width = s->width[way];
         int n = 0;
-        double elsewhere = 0;
         for (int k = 0; k < s->segments; k++) {
             double at[3], behind[3], upper = row_of(s, k + trim), lower = row_of(s, k + 1 - trim);
             width[k] = NAN;
@@ -233,9 +232,20 @@ static double swells(const scene *s, const eye_task *task, int i, int from, int 
             width[k] = (to_side[AT] - from_side[AT]) * (behind[task->low] - at[task->low]) / room;
             values[n++] = width[k];
         }
-        if (n < s->segments - 2 || isnan(width[i]))
+        s->shows[way] = n >= s->segments - 2;
+        s->straight[way] = middle_of(values, n);
+    }
+}
+
+/* Whether the sides stand out where the bit is, and at no bright segment: evidence. */
+static double swells(const scene *s, int i, int from, int to)
+{
+    double both = 0;
+    for (int way = 0; way < 2; way++) {
+        const double *width = s->width[way];
+        double elsewhere = 0, usual = s->straight[way];
+        if (!s->shows[way] || isnan(width[i]))
             continue;
-        double usual = middle_of(values, n);
         for (int k = 0; k < s->segments; k++)
             if ((k < from || k >= to) && !isnan(width[k]))
                 elsewhere = fmax(elsewhere, fabs(width[k] - usual));
@@ -312,7 +322,7 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
         if (c < p->channels)
             s.contrast = fmax(s.contrast, s.bright[c] - s.dark[c]);
     }
-    int filled = 0, rows = 0;
+    int filled = 0, rows = 0, sides = eye_is_coloured(p->channels, task);
     if (s.contrast <= 0 || scale->unit < LEAST_UNIT)
         return 0;
     for (int i = 3; i < segments - 3; i += 2) {
@@ -322,6 +332,8 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
             for (int way = 0; way < 2; way++)
                 fill_margin(p, u, side, &s, task->low, way ? 1 : -1, s.beside + way);
             rows = know_dark_rows(&s, u);
+            if (sides)
+                know_sides(&s, task);
             filled = 1;
         }
         int from = i, to = i + 1;
@@ -331,8 +343,8 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
             to++;
         double evidence = goes_on(&s, i, from, to) + other_black(&s, i) +
                           (rows ? step(&s, u, from, to) : 0);
-        if (evidence <= ENOUGH)
-            evidence += swells(&s, task, i, from, to);
+        if (sides && evidence <= ENOUGH)
+            evidence += swells(&s, i, from, to);
         if (evidence > ENOUGH)
             return 1;
     }

@@ -120,9 +120,9 @@ class FixSearch:
         if isinstance(answer, FixRefusal):
             self.refusal = answer
             return None
-        needed = self.confirmations if len(answer.landmarks) > 2 else self.confirmations + 1
         sightings = [sum(m.landmark == number for m in kept) for number in answer.landmarks]
-        if len(answer.outliers) >= len(answer.landmarks) or sorted(sightings)[-2] < needed:
+        few = sorted(sightings)[-2] < self.confirmations
+        if len(answer.outliers) >= len(answer.landmarks) or few:
             self.refusal = FixRefusal(
                 "The landmarks seen so far contradict each other or wait for another sighting.",
                 "contradiction",

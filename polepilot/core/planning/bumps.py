@@ -19,8 +19,10 @@ from shapely import LineString, MultiPolygon, Polygon
 from polepilot.core.plan import PlanPart
 from polepilot.core.planning.patches import pieces_of, standing_place, strip_of
 from polepilot.core.planning.space import FreeSpace, polygons
+from polepilot.core.planning.swept import few_corners, swept_pieces
 
 Points = NDArray[np.float64]
+Shapes = NDArray[np.object_]
 
 _SLIVER = 0.002
 """What is thinner than twice this is left, metres."""
@@ -53,21 +55,27 @@ def with_bumps(
     space: FreeSpace,
     tool: float,
     smallest: float,
+    enough: float = 0.0,
     whole_parts: bool = False,
 ) -> tuple[Points, tuple[PlanPart, ...]]:
     """The path with bumps to those patches of ``missed`` that are larger than ``smallest`` m².
 
+    ``enough``: the smallest ones are left if all of them together make up no more, m².
     ``whole_parts``: the ends of parts stay where they are.
     """
     opened = missed.buffer(-_SLIVER, quad_segs=2).buffer(_SLIVER, quad_segs=2)
     patches = [patch for patch in polygons(opened) if patch.area >= smallest]
-    if not patches:
+    left = sum(float(patch.area) for patch in patches)
+    if left <= enough:
         return path, parts
     bumped = _Bumped(path, target, space, tool)
     if whole_parts:
         bumped.keep([part.last for part in parts])
     for patch in sorted(patches, key=lambda p: (-float(p.area), p.bounds)):
+        if left <= enough:
+            break
         bumped.reach(patch, _MOST_CUTS)
+        left -= float(patch.area)
     return bumped.result(parts)
 
 
@@ -83,8 +91,15 @@ class _Bumped:
         self._lines = shapely.linestrings(np.stack([path[:-1], path[1:]], axis=1))
         self._tree = shapely.STRtree(self._lines)
         self._kept_marks = np.zeros(0)
-        self._bumps: list[tuple[float, float, Points, LineString]] = []
-        """From and to which length along the path, the places between, the line through them."""
+        # For what it sweeps the path is taken with fewer chords.
+        few = few_corners(path) if len(path) > 2 else np.arange(len(path))
+        self._few, self._few_marks = path[few], self._marks[few]
+        pairs = np.stack([self._few[:-1], self._few[1:]], axis=1)
+        self._few_tree = shapely.STRtree(shapely.linestrings(pairs))
+        self._pieces = swept_pieces(self._few, self._radius, _ROUND)
+        self._bumps: list[tuple[float, float, Points, LineString, shapely.Geometry]] = []
+        """From and to which length along the path, the places between, the line through them,
+        what is swept along it."""
 
     def keep(self, indices: list[int]) -> None:
         """Bumps may not cut across these points of the path."""
@@ -128,7 +143,7 @@ class _Bumped:
             if self._taken(first, last):
                 continue
             tips = np.vstack([a + along * (at - half), a + along * (at + half)]) + depth * beside
-            left = piece.difference(_swept([tips], radius)).area
+            left = piece.difference(self._swept(tips)).area
             if left < _LOSS * (radius / 0.2) ** 2 and self._try(first, last, tips, 4.0):
                 return True
         return False
@@ -173,26 +188,54 @@ class _Bumped:
         new = np.vstack([old[0], tips, old[-1]])
         if not self._space.holds_points(new):
             return False
-        if last - first > 1e-9:
-            before = _swept([old], self._radius)
-            window = before.buffer(self._radius)
-            others: list[Points] = [new]
-            mine = [
-                bump for bump in self._bumps if math.dist(bump[2][0], tips[0]) < 8 * self._radius
-            ]
-            gone = [(first, last), *((bump[0], bump[1]) for bump in mine)]
-            for index in self._tree.query(window, predicate="intersects").tolist():
-                others += self._kept(index, gone)
-            others += [shapely.get_coordinates(bump[3]) for bump in mine]
-            lost = before.difference(_swept(others, self._radius)).intersection(self._target)
-            if lost.area > losses * _LOSS * (self._radius / 0.2) ** 2:
-                return False
-        self._bumps.append((first, last, tips, LineString(new)))
+        most = losses * _LOSS * (self._radius / 0.2) ** 2
+        if last - first > 1e-9 and self._loses(new, first, last, most):
+            return False
+        self._bumps.append((first, last, tips, LineString(new), self._swept(new)))
         return True
+
+    def _loses(self, new: Points, first: float, last: float, most: float) -> bool:
+        """Whether more than ``most`` m² are swept no more if the path goes along ``new`` from
+        ``first`` to ``last``."""
+        inner = self._few[(self._few_marks > first + 1e-9) & (self._few_marks < last - 1e-9)]
+        old = np.vstack([new[0], inner, new[-1]])
+        lost = shapely.union_all(self._capsules(pairwise(old)))
+        for capsule in self._capsules(pairwise(new)):
+            lost = lost.difference(capsule)
+        lost = lost.intersection(self._target)
+        if lost.area <= most:
+            return False
+        mine = [bump for bump in self._bumps if math.dist(bump[2][0], new[1]) < 8 * self._radius]
+        gone = [(first, last), *((bump[0], bump[1]) for bump in mine)]
+        around = [bump[4] for bump in mine]
+        near = self._few_tree.query(lost, predicate="dwithin", distance=self._radius)
+        rest: list[Points] = []
+        for index in near.tolist():
+            a, b = float(self._few_marks[index]), float(self._few_marks[index + 1])
+            if any(start < b and a < end for start, end in gone):
+                rest += self._kept(index, gone)
+            else:
+                around.append(self._pieces[index])
+        if rest:
+            around += list(self._capsules(rest))
+        for shape in around:
+            if shapely.intersects(lost, shape):
+                lost = lost.difference(shape)
+                if lost.area <= most:
+                    return False
+        return True
+
+    def _capsules(self, lines: Iterable[tuple[Points, Points] | Points]) -> Shapes:
+        """What is swept along straight lines, each on its own."""
+        ends = np.array([np.vstack([line[0], line[1]]) for line in lines])
+        return np.asarray(shapely.buffer(shapely.linestrings(ends), self._radius, quad_segs=_ROUND))
+
+    def _swept(self, line: Points) -> shapely.Geometry:
+        return shapely.union_all(self._capsules(pairwise(line)))
 
     def _kept(self, index: int, gone: list[tuple[float, float]]) -> list[Points]:
         """What is left of a segment of the path without some stretches of it."""
-        spans = [(float(self._marks[index]), float(self._marks[index + 1]))]
+        spans = [(float(self._few_marks[index]), float(self._few_marks[index + 1]))]
         for first, last in gone:
             cut: list[tuple[float, float]] = []
             for a, b in spans:
@@ -221,7 +264,7 @@ class _Bumped:
         points: list[Points] = []
         marks: list[float] = []
         at = 0
-        for first, last, tips, _ in sorted(self._bumps, key=lambda bump: (bump[0], bump[1])):
+        for first, last, tips, *_ in sorted(self._bumps, key=lambda bump: (bump[0], bump[1])):
             stop = int(np.searchsorted(self._marks, first - 1e-9))
             points += list(self._path[at:stop])
             marks += self._marks[at:stop].tolist()
@@ -238,9 +281,3 @@ class _Bumped:
             if end > begin:
                 moved.append(PlanPart(part.kind, begin, end))
         return np.array(points), tuple(moved)
-
-
-def _swept(lines: Iterable[Points], radius: float) -> shapely.Geometry:
-    pairs = [np.vstack(pair) for line in lines for pair in pairwise(line)]
-    capsules = shapely.buffer(shapely.linestrings(np.array(pairs)), radius, quad_segs=_ROUND)
-    return shapely.union_all(capsules)

@@ -55,6 +55,8 @@ _SHARE = 0.00008
 """Nor those smaller than this share of all that is to be swept."""
 _ENOUGH = 0.0003
 """Where less than this share of all is missed, no further patch is visited."""
+_TRIFLE = 0.0001
+"""Where less than this share is missed by a path with sharp corners, it gets no further bump."""
 _MANY = 60
 _SMALLEST = 0.008
 """Missed patches below this are left, m² for a tool of 0.4 m; scaled with its square."""
@@ -266,6 +268,7 @@ def _path(
                 space,
                 tool,
                 min(_LEAST * tool**2, _SHARE * target.area),
+                _TRIFLE * target.area,
                 options.order == "paper",
             )
         return path, np.ones(len(path) - 1, np.int8), parts

@@ -15,21 +15,72 @@ from polepilot.core.geometry import Point
 
 _SHIFT = 6
 """Fractional bits of OpenCV's drawing coordinates."""
+_CHORD = 0.0003
+"""How far the chords of a path's arcs may be from it, metres."""
 _MOST_CELLS = 30_000_000
 SMALLEST_PATCH = 0.01
 """A missed patch smaller than this is not worth a visit, m²."""
 
 
-def swept_shape(path: NDArray[np.float64], tool_width: float) -> shapely.Geometry:
+def swept_shape(
+    path: NDArray[np.float64], tool_width: float, quad_segs: int = 16
+) -> shapely.Geometry:
     """What a disc of diameter ``tool_width`` sweeps along N x 2 points.
 
-    One capsule per segment, united: buffering the whole line overstates coverage.
+    A rectangle per segment and a sector per corner, united: buffering the whole line overstates
+    coverage. ``quad_segs``: chords per quarter of a circle.
     """
-    steps = path[np.r_[True, np.hypot(*np.diff(path, axis=0).T) > 1e-9]]
-    if len(steps) < 2:
-        return shapely.Point(path[0]).buffer(tool_width / 2, quad_segs=16)
-    lines = shapely.linestrings(np.stack([steps[:-1], steps[1:]], axis=1))
-    return shapely.union_all(shapely.buffer(lines, tool_width / 2, quad_segs=16))
+    radius = tool_width / 2
+    path = path[np.r_[True, np.hypot(*np.diff(path, axis=0).T) > 1e-9]]
+    if len(path) > 2:
+        path = path[few_corners(path)]
+    ends = shapely.buffer(shapely.points(path[[0, -1]]), radius, quad_segs=quad_segs)
+    if len(path) < 2:
+        return shapely.union_all(ends)
+    pieces = np.concatenate([ends, swept_pieces(path, radius, quad_segs)])
+    try:
+        return shapely.union_all(pieces)
+    except shapely.GEOSException:  # corners nearly coincide; whole capsules have none in common
+        lines = shapely.linestrings(np.stack([path[:-1], path[1:]], axis=1))
+        return shapely.union_all(shapely.buffer(lines, radius, quad_segs=quad_segs))
+
+
+def few_corners(path: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Which points of a path stay so that its arcs are drawn with few chords."""
+    line = shapely.linestrings(np.column_stack([path, np.arange(len(path))]))
+    line = shapely.simplify(line, _CHORD, preserve_topology=False)
+    return np.asarray(np.round(shapely.get_coordinates(line, include_z=True)[:, 2]), np.intp)
+
+
+def swept_pieces(
+    path: NDArray[np.float64], radius: float, quad_segs: int = 16
+) -> NDArray[np.object_]:
+    """What a disc sweeps along each segment but for the half discs at the path's two ends.
+
+    A polygon per segment: a rectangle, with the sector at the corner that follows.
+    """
+    steps = np.diff(path, axis=0)
+    directions = np.arctan2(steps[:, 1], steps[:, 0])
+    turns: NDArray[np.float64] = np.append(np.diff(directions), 0.0)
+    turns = (turns + math.pi) % math.tau - math.pi
+    turns = np.where(np.abs(turns) > 3.1, np.copysign(math.pi, turns), turns)
+    side = np.where(turns < 0, -1.0, 1.0)  # the sector is on the other side
+    chords = np.ceil(np.abs(turns) / (math.pi / 2 / quad_segs) - 1e-9).astype(np.intp)
+    sizes = chords + 5
+    rows = np.repeat(np.arange(len(steps)), sizes)
+    place = np.arange(len(rows)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    share = np.clip(place - 2, 0, chords[rows]) / np.maximum(chords[rows], 1)
+    across = directions[rows] + turns[rows] * share + math.pi / 2
+    last = place == sizes[rows] - 1
+    whole = np.abs(turns[rows]) > 3.1  # half a disc: its middle is no corner
+    middle = (place == sizes[rows] - 2) & ~whole
+    last |= (place == sizes[rows] - 2) & whole
+    across = np.where(last, directions[rows] + math.pi / 2, across)
+    out = np.where((place == 0) | last, 1.0, -1.0) * side[rows] * radius
+    out[middle] = 0.0
+    coords = np.where((place < 2)[:, None], path[:-1][rows], path[1:][rows])
+    coords = coords + out[:, None] * np.stack([np.cos(across), np.sin(across)], axis=1)
+    return np.asarray(shapely.polygons(shapely.linearrings(coords, indices=rows)))
 
 
 class SweptArea:

@@ -26,6 +26,9 @@ from polepilot.core.planning.curves import (
 
 Points = NDArray[np.float64]
 
+_SHORTEST = 0.004
+"""Pieces shorter than this are not driven, metres."""
+
 
 @dataclass(frozen=True, slots=True)
 class Turn:
@@ -87,6 +90,8 @@ def _left_turns(turn: float, radius: float) -> tuple[Turn, ...]:
         start = Pose2D(first, 0.0, 0.0)
         end = Pose2D(last * math.cos(turn), last * math.sin(turn), wrap_angle(turn))
         for curve in shortest_curves(start, end, radius, CHANGE)[:4]:
+            if any(abs(length) < _SHORTEST for _, length in curve):
+                continue
             checks: list[Points] = []
             if not visit and first < 0:
                 checks += [np.array([first * share, 0.0]) for share in (0.0, 0.25, 0.5, 0.75)]

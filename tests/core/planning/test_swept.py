@@ -6,9 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import shapely
 from shapely import MultiPolygon, Point, Polygon, box
 
-from polepilot.core.planning.swept import SweptArea, swept_shape
+from polepilot.core.planning.swept import SweptArea, swept_pieces, swept_shape
 
 ROOM = MultiPolygon([box(0, 0, 4, 3).difference(box(1.5, 1, 2.5, 2))])
 
@@ -54,3 +55,14 @@ def test_exact_sweep_of_a_straight_line() -> None:
     shape = swept_shape(np.array([[0.0, 0], [1, 0], [1, 0]]), 0.4)
     assert shape.area == pytest.approx(0.4 + np.pi * 0.04, rel=0.005)
     assert isinstance(shape, Polygon)
+
+
+def test_a_shape_swept_is_that_of_capsules() -> None:
+    rng = np.random.default_rng(3)
+    path = np.cumsum(rng.normal(0, 0.2, (120, 2)), axis=0)
+    path[40:44] = path[40] + np.array([[0, 0], [0.5, 0], [0.2, 0], [0.2, 0]])  # there and back
+    lines = shapely.linestrings(np.stack([path[:-1], path[1:]], axis=1))
+    capsules = shapely.union_all(shapely.buffer(lines, 0.2, quad_segs=32))
+    swept = swept_shape(path, 0.4)
+    assert swept.symmetric_difference(capsules).area < 0.002 * capsules.area
+    assert shapely.is_valid(swept_pieces(path[:40], 0.2)).all()

@@ -30,7 +30,7 @@ static uint16_t pass_time(void)
     uint32_t gone = now - then;
 
     then = now;
-    return (uint16_t)(gone > LONGEST_MS ? LONGEST_MS : gone);
+    return (uint16_t)((gone > LONGEST_MS) ? LONGEST_MS : gone);
 }
 
 void board_pass(void)
@@ -42,15 +42,15 @@ void board_pass(void)
     if (elapsed > 0u) {
         alive |= ALIVE_CLOCK;
     }
-    if (hal_read_inputs(&robot_inputs)) {
+    if (hal_read_inputs(&robot_inputs) != 0u) {
         alive |= ALIVE_INPUTS;
     }
-    if (hal_overflowed()) {
+    if (hal_overflowed() != 0u) {
         robot_note(FAULT_RECEIVE_OVERFLOW);
     }
     robot_advance(elapsed);
     link_advance(elapsed);
-    while (left > 0u && hal_receive(&byte)) {
+    while ((left > 0u) && (hal_receive(&byte) != 0u)) {
         (void)link_byte(byte);
         left--;
     }

@@ -1,26 +1,26 @@
 #include "core/crc16.h"
 
-uint16_t crc16_add(uint16_t crc, uint8_t byte)
+/* `crc` with one more byte. */
+static uint16_t add(uint16_t crc, uint8_t byte)
 {
     uint8_t top = (uint8_t)((uint8_t)(crc >> 8) ^ byte);
+    uint16_t next = (uint16_t)(crc << 8);
 
     /* Eight steps of the shift register at once: the polynomial x^16 + x^12 + x^5 + 1 folds the
      * upper byte twice into itself and then onto three places. No table, no loop. */
     top = (uint8_t)(top ^ (top >> 4));
-    crc = (uint16_t)(crc << 8);
-    crc = (uint16_t)(crc ^ ((uint16_t)top << 12));
-    crc = (uint16_t)(crc ^ ((uint16_t)top << 5));
-    return (uint16_t)(crc ^ top);
+    next = (uint16_t)(next ^ ((uint16_t)top << 12));
+    next = (uint16_t)(next ^ ((uint16_t)top << 5));
+    return (uint16_t)(next ^ top);
 }
 
 uint16_t crc16(const uint8_t *bytes, uint8_t length)
 {
     uint16_t crc = CRC16_START;
+    uint8_t i;
 
-    while (length > 0u) {
-        crc = crc16_add(crc, *bytes);
-        bytes++;
-        length--;
+    for (i = 0u; i < length; i++) {
+        crc = add(crc, bytes[i]);
     }
     return crc;
 }

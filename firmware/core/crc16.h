@@ -6,10 +6,7 @@
 
 #define CRC16_START 0xFFFFu
 
-/* `crc` with one more byte. Of "123456789" it is 29B1. */
-uint16_t crc16_add(uint16_t crc, uint8_t byte);
-
-/* Of `length` bytes. */
+/* Of `length` bytes; of "123456789" it is 29B1. */
 uint16_t crc16(const uint8_t *bytes, uint8_t length);
 
 #endif

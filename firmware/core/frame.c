@@ -28,7 +28,7 @@ void frame_init(void)
 
 static void take(uint8_t byte)
 {
-    if (skipping) {
+    if (skipping != 0u) {
         return;
     }
     if (taken == MAX_ENCODED) {
@@ -56,7 +56,7 @@ static uint8_t good(void)
     uint8_t length;
     uint16_t sent;
 
-    if (left > 0u || filled < MIN_BODY) {
+    if ((left > 0u) || (filled < MIN_BODY)) {
         return 0u;
     }
     length = (uint8_t)(filled - CRC_SIZE);
@@ -76,9 +76,9 @@ uint8_t frame_push(uint8_t byte)
         take(byte);
         return 0u;
     }
-    if (!skipping && taken > 0u) {
+    if ((skipping == 0u) && (taken > 0u)) {
         complete = good();
-        if (!complete) {
+        if (complete == 0u) {
             frame_errors++;
         }
     }
@@ -90,18 +90,18 @@ uint8_t frame_encode(uint8_t *bytes, uint8_t length)
 {
     uint16_t crc = crc16(&bytes[1], length);
     uint8_t code = 0u; /* where the distance to the next zero belongs */
+    uint8_t end = (uint8_t)(length + CRC_SIZE + 1u);
     uint8_t i;
 
     bytes[length + 1u] = (uint8_t)(crc & 0xFFu);
     bytes[length + 2u] = (uint8_t)(crc >> 8);
-    length = (uint8_t)(length + CRC_SIZE + 1u);
-    for (i = 1u; i < length; i++) {
+    for (i = 1u; i < end; i++) {
         if (bytes[i] == 0u) {
             bytes[code] = (uint8_t)(i - code);
             code = i;
         }
     }
-    bytes[code] = (uint8_t)(length - code);
-    bytes[length] = 0u;
-    return (uint8_t)(length + 1u);
+    bytes[code] = (uint8_t)(end - code);
+    bytes[end] = 0u;
+    return (uint8_t)(end + 1u);
 }

@@ -60,7 +60,7 @@ static void finish(uint8_t reserve)
     uint8_t room = hal_room();
     uint8_t i;
 
-    if (room < length || (uint8_t)(room - length) < reserve) {
+    if ((room < length) || ((uint8_t)(room - length) < reserve)) {
         return;
     }
     for (i = 0u; i < length; i++) {
@@ -87,14 +87,16 @@ void link_init(void)
 
 void link_advance(uint16_t elapsed)
 {
+    uint16_t late;
+
     t_ms += elapsed;
-    memory_left = memory_left > elapsed ? (uint16_t)(memory_left - elapsed) : 0u;
+    memory_left = (memory_left > elapsed) ? (uint16_t)(memory_left - elapsed) : 0u;
     if (telemetry_left > elapsed) {
         telemetry_left = (uint16_t)(telemetry_left - elapsed);
     } else {
         /* Late by some milliseconds: the next one comes the sooner. */
-        elapsed = (uint16_t)(elapsed - telemetry_left) % TELEMETRY_PERIOD_MS;
-        telemetry_left = (uint16_t)(TELEMETRY_PERIOD_MS - elapsed);
+        late = (uint16_t)(elapsed - telemetry_left) % TELEMETRY_PERIOD_MS;
+        telemetry_left = (uint16_t)(TELEMETRY_PERIOD_MS - late);
         telemetry_due = 1u;
     }
 }
@@ -139,17 +141,17 @@ static void remember(uint8_t type, uint8_t length, uint8_t status)
     memory_type = type;
     memory_seq = last_seq;
     memory_status = status;
-    memory_payload[0] = length > 0u ? PAYLOAD[0] : 0u;
-    memory_payload[1] = length > 1u ? PAYLOAD[1] : 0u;
+    memory_payload[0] = (length > 0u) ? PAYLOAD[0] : 0u;
+    memory_payload[1] = (length > 1u) ? PAYLOAD[1] : 0u;
 }
 
 static uint8_t repeated(uint8_t type, uint8_t length)
 {
-    if (memory_left == 0u || memory_type != type || memory_seq != last_seq) {
+    if ((memory_left == 0u) || (memory_type != type) || (memory_seq != last_seq)) {
         return 0u;
     }
-    return (uint8_t)(length == 0u ||
-                     (memory_payload[0] == PAYLOAD[0] && memory_payload[1] == PAYLOAD[1]));
+    return (uint8_t)((length == 0u) ||
+                     ((memory_payload[0] == PAYLOAD[0]) && (memory_payload[1] == PAYLOAD[1])));
 }
 
 /* ARM, PAN, CLEAR: once, however often they come. */
@@ -157,7 +159,7 @@ static void command(uint8_t type, uint8_t length)
 {
     uint8_t status;
 
-    if (repeated(type, length)) {
+    if (repeated(type, length) != 0u) {
         acknowledge(memory_status);
         return;
     }
@@ -208,7 +210,7 @@ static void pong(void)
 /* ESTOP is carried out always: from any version, at any length, before HELLO, repeated or not. */
 static void estop(uint8_t ours, uint8_t length)
 {
-    uint8_t status = (uint8_t)(!ours || length == 0u ? STATUS_OK : STATUS_LENGTH);
+    uint8_t status = ((ours == 0u) || (length == 0u)) ? STATUS_OK : STATUS_LENGTH;
 
     robot_estop();
     remember(MSG_ESTOP, 0u, status);
@@ -224,7 +226,7 @@ static void obey(void)
 
     if (type == MSG_ESTOP) {
         estop(ours, length);
-    } else if (!ours) {
+    } else if (ours == 0u) {
         if (type == MSG_HELLO) {
             greet(0u);
         } else {
@@ -249,7 +251,7 @@ static void obey(void)
 
 uint8_t link_byte(uint8_t byte)
 {
-    if (!frame_push(byte)) {
+    if (frame_push(byte) == 0u) {
         return 0u;
     }
     robot_heard();
@@ -262,7 +264,7 @@ void link_report(void)
 {
     uint8_t i;
 
-    if (!telemetry_due) {
+    if (telemetry_due == 0u) {
         return;
     }
     telemetry_due = 0u;
@@ -273,14 +275,15 @@ void link_report(void)
     put8(last_seq);
     put8(frame_errors);
     for (i = 0u; i < 2u; i++) {
-        put32((settings.features & FEATURE_ENCODERS) ? (uint32_t)robot_inputs.odometer[i] : 0u);
+        put32(((settings.features & FEATURE_ENCODERS) != 0u) ? (uint32_t)robot_inputs.odometer[i] : 0u);
     }
     put16((uint16_t)robot_outputs.left);
     put16((uint16_t)robot_outputs.right);
     put16((uint16_t)robot_outputs.steering);
     put16(robot_inputs.pan_adc);
     for (i = 0u; i < 3u; i++) {
-        put16((settings.features & FEATURE_PROXIMITY) ? robot_inputs.proximity_mm[i] : NO_SENSOR);
+        put16(((settings.features & FEATURE_PROXIMITY) != 0u) ? robot_inputs.proximity_mm[i]
+                                                              : NO_SENSOR);
     }
     put16(robot_inputs.battery_mv);
     /* An answer is worth more than a report: its room stays free. */

@@ -10,7 +10,7 @@ int16_t clamp(int16_t value, int16_t limit)
     if (value > limit) {
         return limit;
     }
-    return (int16_t)(value < -limit ? -limit : value);
+    return (int16_t)((value < -limit) ? -limit : value);
 }
 
 int16_t approach(int16_t value, int16_t target, uint16_t reach)
@@ -19,10 +19,10 @@ int16_t approach(int16_t value, int16_t target, uint16_t reach)
 
     if (value < target) {
         gap = (uint16_t)((uint16_t)target - (uint16_t)value);
-        return gap <= reach ? target : (int16_t)(value + (int16_t)reach);
+        return (gap <= reach) ? target : (int16_t)(value + (int16_t)reach);
     }
     gap = (uint16_t)((uint16_t)value - (uint16_t)target);
-    return gap <= reach ? target : (int16_t)(value - (int16_t)reach);
+    return (gap <= reach) ? target : (int16_t)(value - (int16_t)reach);
 }
 
 void motor_off(struct motor *motor)
@@ -32,16 +32,14 @@ void motor_off(struct motor *motor)
 
 void motor_run(struct motor *motor, int16_t target, uint16_t elapsed, uint8_t slew)
 {
+    uint16_t left = (elapsed > LONGEST) ? LONGEST : elapsed;
     int16_t goal;
 
-    if (elapsed > LONGEST) {
-        elapsed = LONGEST;
-    }
-    while (elapsed > 0u) {
-        elapsed--;
-        motor->speed = (int16_t)(motor->speed + (motor->duty * SCALE - motor->speed) / LAG_MS);
+    while (left > 0u) {
+        left--;
+        motor->speed = (int16_t)(motor->speed + (((motor->duty * SCALE) - motor->speed) / LAG_MS));
         goal = target;
-        if ((goal < 0 && motor->speed > REST) || (goal > 0 && motor->speed < -REST)) {
+        if (((goal < 0) && (motor->speed > REST)) || ((goal > 0) && (motor->speed < -REST))) {
             goal = 0;
         }
         motor->duty = approach(motor->duty, goal, slew);

@@ -49,7 +49,10 @@ static uint8_t expired(uint16_t *timer, uint16_t elapsed)
 
 static int8_t sign(int16_t value)
 {
-    return (int8_t)((value > 0) - (value < 0));
+    if (value == 0) {
+        return 0;
+    }
+    return (value > 0) ? 1 : -1;
 }
 
 /* Wheels off at once; the servo stays, or a robot that still rolls would swerve. */
@@ -128,7 +131,7 @@ static uint8_t blocked(void)
 {
     uint8_t i;
 
-    if (!(settings.features & FEATURE_PROXIMITY)) {
+    if ((settings.features & FEATURE_PROXIMITY) == 0u) {
         return 0u;
     }
     for (i = 0u; i < 3u; i++) {
@@ -143,13 +146,13 @@ uint8_t robot_faults(void)
 {
     uint8_t faults = kept_faults;
 
-    if (robot_inputs.stop_button) {
+    if (robot_inputs.stop_button != 0u) {
         faults |= FAULT_STOP_BUTTON;
     }
-    if (blocked()) {
+    if (blocked() != 0u) {
         faults |= FAULT_PROXIMITY_STOP;
     }
-    if (low_battery) {
+    if (low_battery != 0u) {
         faults |= FAULT_LOW_BATTERY;
     }
     if (pan_stuck != 0) {
@@ -170,22 +173,22 @@ void robot_heard(void)
 
 void robot_advance(uint16_t elapsed)
 {
-    if (robot_inputs.stop_button) {
+    if (robot_inputs.stop_button != 0u) {
         stop(STATE_ESTOP);
     }
-    if (expired(&link_left, elapsed)) {
+    if (expired(&link_left, elapsed) != 0u) {
         pan_off();
         if (state == STATE_ARMED) {
             stop(STATE_LINK_LOST);
         }
     }
-    if (expired(&drive_left, elapsed)) {
+    if (expired(&drive_left, elapsed) != 0u) {
         halt();
     }
-    if (expired(&steering_left, elapsed)) {
+    if (expired(&steering_left, elapsed) != 0u) {
         wanted_steering = 0;
     }
-    if (expired(&pan_left, elapsed)) {
+    if (expired(&pan_left, elapsed) != 0u) {
         pan_off();
     }
 }
@@ -195,7 +198,7 @@ void robot_advance(uint16_t elapsed)
 void robot_hello(uint8_t ok)
 {
     ready = ok;
-    stop(state == STATE_ESTOP ? STATE_ESTOP : STATE_IDLE);
+    stop((state == STATE_ESTOP) ? STATE_ESTOP : STATE_IDLE);
     wanted_steering = 0;
     steering = 0;
     drive_left = 0u;
@@ -221,7 +224,7 @@ void robot_drive(int16_t left, int16_t right, int16_t angle)
 
 uint8_t robot_arm(void)
 {
-    if (!ready || state == STATE_ESTOP) {
+    if ((ready == 0u) || (state == STATE_ESTOP)) {
         return STATUS_NOT_READY;
     }
     if (state != STATE_ARMED) {
@@ -233,7 +236,7 @@ uint8_t robot_arm(void)
 
 uint8_t robot_pan(int16_t rate)
 {
-    if (!ready || (state != STATE_IDLE && state != STATE_ARMED)) {
+    if ((ready == 0u) || ((state != STATE_IDLE) && (state != STATE_ARMED))) {
         return STATUS_NOT_READY;
     }
     wanted_pan = clamp(rate, MAX_DUTY);
@@ -249,7 +252,7 @@ uint8_t robot_clear(uint16_t key)
     if (key != CLEAR_KEY) {
         return STATUS_RANGE;
     }
-    if (!ready || robot_inputs.stop_button) {
+    if ((ready == 0u) || (robot_inputs.stop_button != 0u)) {
         return STATUS_NOT_READY;
     }
     if (state != STATE_LINK_LOST) {
@@ -267,10 +270,10 @@ static void actuate_wheels(uint16_t elapsed)
     int16_t left = wanted_left;
     int16_t right = wanted_right;
 
-    if (blocked()) {
+    if (blocked() != 0u) {
         /* Nothing turns forward before an obstacle, not even to slow down gently. */
-        left = left > 0 ? 0 : left;
-        right = right > 0 ? 0 : right;
+        left = (left > 0) ? 0 : left;
+        right = (right > 0) ? 0 : right;
         if (left_motor.duty > 0) {
             motor_off(&left_motor);
         }
@@ -285,36 +288,41 @@ static void actuate_wheels(uint16_t elapsed)
 /* Whether the pan motor must not turn this way (the sign of a duty). */
 static uint8_t pan_forbidden(int8_t way)
 {
-    int8_t rising = settings.pan_rising ? way : (int8_t)-way;
+    int8_t rising = (settings.pan_rising != 0u) ? way : (int8_t)-way;
 
-    if (!(settings.features & FEATURE_PAN) || (way != 0 && way == pan_stuck)) {
+    if (((settings.features & FEATURE_PAN) == 0u) || ((way != 0) && (way == pan_stuck))) {
         return 1u;
     }
-    return (uint8_t)((rising < 0 && robot_inputs.pan_adc <= settings.pan_low) ||
-                     (rising > 0 && robot_inputs.pan_adc >= settings.pan_high));
+    return (uint8_t)(((rising < 0) && (robot_inputs.pan_adc <= settings.pan_low)) ||
+                     ((rising > 0) && (robot_inputs.pan_adc >= settings.pan_high)));
 }
 
 static void watch_pan(uint16_t elapsed)
 {
     uint16_t adc = robot_inputs.pan_adc;
-    uint16_t moved = (uint16_t)(adc > pan_mark ? adc - pan_mark : pan_mark - adc);
+    uint16_t moved = (uint16_t)(adc - pan_mark);
     int16_t duty = pan_motor.duty;
 
-    if (moved >= PAN_STUCK_COUNTS || (duty < PAN_STUCK_DUTY && duty > -PAN_STUCK_DUTY)) {
+    if (adc < pan_mark) {
+        moved = (uint16_t)(pan_mark - adc);
+    }
+    if ((moved >= PAN_STUCK_COUNTS) || ((duty < PAN_STUCK_DUTY) && (duty > -PAN_STUCK_DUTY))) {
         pan_mark = adc;
         pan_still_left = PAN_STUCK_MS;
-    } else if (expired(&pan_still_left, elapsed)) {
+    } else if (expired(&pan_still_left, elapsed) != 0u) {
         pan_stuck = sign(duty);
         motor_off(&pan_motor);
+    } else {
+        /* it may still begin to move */
     }
 }
 
 static void actuate_pan(uint16_t elapsed)
 {
-    int16_t wanted = pan_forbidden(sign(wanted_pan)) ? 0 : wanted_pan;
+    int16_t wanted = (pan_forbidden(sign(wanted_pan)) != 0u) ? 0 : wanted_pan;
 
     motor_run(&pan_motor, wanted, elapsed, settings.pan_slew);
-    if (wanted == 0 || pan_forbidden(sign(pan_motor.duty))) {
+    if ((wanted == 0) || (pan_forbidden(sign(pan_motor.duty)) != 0u)) {
         motor_off(&pan_motor);
     }
 }
@@ -323,13 +331,13 @@ static void watch_battery(void)
 {
     uint16_t limit = settings.low_battery_mv;
 
-    if (!(settings.features & FEATURE_BATTERY)) {
+    if ((settings.features & FEATURE_BATTERY) == 0u) {
         return;
     }
-    if (low_battery) {
+    if (low_battery != 0u) {
         limit = (uint16_t)(limit + BATTERY_HYSTERESIS_MV);
     }
-    low_battery = robot_inputs.battery_mv < limit;
+    low_battery = (uint8_t)(robot_inputs.battery_mv < limit);
 }
 
 void robot_actuate(uint16_t elapsed)

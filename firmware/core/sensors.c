@@ -19,12 +19,14 @@ static const struct point CURVE[] = {
     {84u, 800u},  {92u, 700u},  {106u, 600u}, {125u, 500u}, {151u, 400u}, {188u, 300u},
     {221u, 250u}, {268u, 200u}, {336u, 150u}, {475u, 100u}, {563u, 80u},  {634u, 60u},
 };
-#define LAST (sizeof CURVE / sizeof CURVE[0] - 1u)
+#define LAST ((sizeof(CURVE) / sizeof(CURVE[0])) - 1u)
 
 uint16_t sensors_proximity_mm(uint16_t adc)
 {
     uint8_t i = 0u;
-    uint16_t width, height, along;
+    uint16_t width;
+    uint16_t height;
+    uint16_t along;
 
     if (adc < NOTHING_WIRED) {
         return NO_SENSOR;

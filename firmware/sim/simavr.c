@@ -4,7 +4,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include <avr_adc.h>
 #include <avr_ioport.h>
@@ -14,12 +13,13 @@
 #include <sim_time.h>
 
 #include "core/protocol.h"
+#include "sim/line.h"
 #include "sim/pty.h"
+#include "sim/ranger.h"
 #include "sim/steps.h"
 
 #define HZ 16000000u
 #define CYCLES_PER_US (HZ / 1000000u)
-#define PATIENCE_S 10
 #define COUNTS 1023u
 #define SUPPLY_MV 5000u
 #define BATTERY_DIVIDER 3u
@@ -74,19 +74,6 @@ static void (*reset_of_chip)(avr_t *avr);
 static unsigned starts;
 static uint64_t cycles_per_byte;
 
-static uint8_t received[65536];
-static size_t received_first, received_end;
-static uint64_t received_total;
-static uint8_t unsent[65536];
-static size_t unsent_length;
-static uint64_t sent_total;
-
-static void fail(const char *why)
-{
-    fprintf(stderr, "polepilot-board: %s\n", why);
-    exit(1);
-}
-
 /* ---- the line */
 
 static uint8_t held_back; /* simavr reads a byte of its own queue only after the one before */
@@ -101,11 +88,11 @@ static void hold_back(avr_irq_t *irq, uint32_t value, void *param)
 
 static avr_cycle_count_t next_byte(avr_t *chip, avr_cycle_count_t when, void *param)
 {
+    uint8_t byte;
+
     (void)param;
-    if (!held_back && received_first < received_end) {
-        avr_raise_irq(avr_io_getirq(chip, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT),
-                      received[received_first]);
-        received_first++;
+    if (!held_back && line_next(&byte)) {
+        avr_raise_irq(avr_io_getirq(chip, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT), byte);
     }
     return when + cycles_per_byte;
 }
@@ -114,71 +101,10 @@ static void from_chip(avr_irq_t *irq, uint32_t value, void *param)
 {
     (void)irq;
     (void)param;
-    if (unsent_length < sizeof unsent) {
-        unsent[unsent_length] = (uint8_t)value;
-        unsent_length++;
-    }
-}
-
-static void take_bytes(uint64_t total)
-{
-    time_t deadline = time(NULL) + PATIENCE_S;
-
-    received_end -= received_first;
-    memmove(received, &received[received_first], received_end);
-    received_first = 0u;
-    while (received_total < total) {
-        size_t count = pty_read(&received[received_end], sizeof received - received_end);
-
-        received_end += count;
-        received_total += count;
-        if (time(NULL) > deadline) {
-            fail("bytes were announced and did not come");
-        }
-        if (count == 0u) {
-            pty_wait(10);
-        }
-    }
-}
-
-static void flush(void)
-{
-    time_t deadline = time(NULL) + PATIENCE_S;
-    size_t first = 0u;
-
-    while (first < unsent_length) {
-        first += pty_write(&unsent[first], unsent_length - first);
-        if (time(NULL) > deadline) {
-            fail("nobody reads the line");
-        }
-    }
-    sent_total += unsent_length;
-    unsent_length = 0u;
+    line_put((uint8_t)value);
 }
 
 /* ---- pins */
-
-/* The voltage of an infrared ranger before a wall, millivolts: the data sheet's curve, with its
- * fall below 60 mm. */
-static uint32_t ranger_mv(uint16_t mm)
-{
-    static const uint32_t CURVE[][2] = {
-        {0, 300},    {20, 1400},  {30, 1900},  {40, 2400},  {50, 2800}, {60, 3100}, {80, 2750},
-        {100, 2320}, {150, 1640}, {200, 1310}, {250, 1080}, {300, 920}, {400, 740}, {500, 610},
-        {600, 520},  {700, 450},  {800, 410},  {1500, 300}, {65534, 280},
-    };
-    size_t i = 0;
-
-    if (mm == NO_SENSOR) {
-        return 0u;
-    }
-    while (mm > CURVE[i + 1][0]) {
-        i++;
-    }
-    return (uint32_t)((int32_t)CURVE[i][1] + ((int32_t)CURVE[i + 1][1] - (int32_t)CURVE[i][1]) *
-                                                 (int32_t)(mm - CURVE[i][0]) /
-                                                 (int32_t)(CURVE[i + 1][0] - CURVE[i][0]));
-}
 
 static void set_voltage(int channel, uint32_t mv)
 {
@@ -278,7 +204,7 @@ static void run_until(avr_cycle_count_t end)
         int state = avr_run(avr);
 
         if (state == cpu_Done || state == cpu_Crashed) {
-            fail("the chip has crashed");
+            line_fail("the chip has crashed");
         }
     }
 }
@@ -296,13 +222,13 @@ static void hang(void)
             return;
         }
     }
-    fail("there is no endless loop in the program to hang in");
+    line_fail("there is no endless loop in the program to hang in");
 }
 
 static void power_cycle(void)
 {
     avr_reset(avr);
-    received_first = received_end;
+    line_drop();
 }
 
 /* simavr writes to standard output, which is taken. */
@@ -328,11 +254,11 @@ static void start(const char *chip, const char *program)
     avr_global_logger_set(say);
     memset(&firmware, 0, sizeof firmware);
     if (wiring == NULL || elf_read_firmware(program, &firmware) != 0) {
-        fail("no such chip or program");
+        line_fail("no such chip or program");
     }
     avr = avr_make_mcu_by_name(chip);
     if (avr == NULL || avr_init(avr) != 0) {
-        fail("simavr does not know the chip");
+        line_fail("simavr does not know the chip");
     }
     firmware.frequency = HZ;
     avr_load_firmware(avr, &firmware);
@@ -380,12 +306,11 @@ int main(int count, char **words)
         } else if (step.kind == POWER) {
             power_cycle();
         } else {
-            take_bytes(step.bytes);
+            line_take(step.bytes);
             set_pins(&step.inputs);
             run_until(step.t_us * CYCLES_PER_US);
-            flush();
         }
         read_pins(&outputs);
-        steps_answer(sent_total, &outputs, starts);
+        steps_answer(line_flush(), &outputs, starts);
     }
 }

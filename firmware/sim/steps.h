@@ -31,6 +31,9 @@ struct step {
  * where the line cannot be understood. */
 void steps_read(struct step *step);
 
+/* What anything else prints on standard output goes nowhere from now on. */
+void steps_own_stdout(void);
+
 void steps_answer(uint64_t bytes, const struct outputs *outputs, unsigned starts);
 
 #endif

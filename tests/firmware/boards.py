@@ -17,15 +17,23 @@ FIRMWARE = Path(__file__).parents[2] / "firmware"
 BUILD = FIRMWARE / "build"
 HOST = BUILD / "host" / "polepilot-board"
 BAUD = 250_000
+PIC_BAUD = 115_200
 AVRS = ("atmega328p", "atmega2560")
+PIC = "pic18f4550"
+CHIPS = (*AVRS, PIC)
 TOOLS = {
     "host": ("make", "cc"),
     "tests": ("make", "cc"),
     "avr": ("make", "avr-gcc", "avr-objcopy", "avr-size"),
     "simavr": ("make", "cc"),
+    "pic": ("make", "gcc", "g++", "bison", "flex", "dpkg-source", "gpasm", "gplink"),
+    "gpsim": ("make", "cc", "c++", "pkg-config", "gpsim"),
     "check": ("make", "cc", "cppcheck"),
 }
-PACKAGES = "make gcc libc6-dev gcc-avr avr-libc simavr libsimavr-dev libelf-dev cppcheck"
+PACKAGES = (
+    "make gcc libc6-dev gcc-avr avr-libc simavr libsimavr-dev libelf-dev cppcheck gpsim-dev "
+    "libglib2.0-dev pkg-config g++ bison flex libboost-dev zlib1g-dev dpkg-dev gputils"
+)
 NOTHING_NEAR = (1500, 1500, 1500)
 
 
@@ -60,6 +68,22 @@ def avr_board(chip: str) -> BoardProcess:
     make("simavr", of="simavr")
     program = BUILD / "simavr" / "polepilot-board"
     return BoardProcess([str(program), LINK, chip, str(BUILD / chip / "polepilot.elf"), str(BAUD)])
+
+
+def pic_board() -> BoardProcess:
+    """The machine code for the PIC18F4550 in gpsim."""
+    make("pic", of="pic")
+    make("gpsim", of="gpsim")
+    program = BUILD / "gpsim" / "polepilot-board"
+    built = BUILD / PIC / "polepilot.hex"
+    lines = (line.split() for line in built.with_suffix(".map").read_text("utf-8").splitlines())
+    main_loop = next(words[1] for words in lines if words[:1] == ["_board_pass"])
+    return BoardProcess([str(program), LINK, str(built), main_loop, str(PIC_BAUD)])
+
+
+def chip_board(chip: str) -> BoardProcess:
+    """The machine code for ``chip`` in its emulator."""
+    return pic_board() if chip == PIC else avr_board(chip)
 
 
 class StepPort:

@@ -1,7 +1,7 @@
 """Every board made of C against the suite that the simulated board passes.
 
-The host program, and the machine code of both AVR chips under simavr: bytes through a
-pseudo-terminal, time as the test says, so that a busy computer changes nothing.
+The host program, the machine code of both AVR chips under simavr and that of the PIC under gpsim:
+bytes through a pseudo-terminal, time as the test says, so that a busy computer changes nothing.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import pytest
 from core.link.conformance import Conformance, PinConformance, Senses
-from firmware.boards import StepPort, avr_board, host_board
+from firmware.boards import StepPort, avr_board, host_board, pic_board
 
 CONVERTERS = Senses(nearest_mm=78, farthest_mm=800, error_mm=3, battery_error_mv=20)
 """Infrared rangers on a 10-bit converter, and a battery behind a divider."""
@@ -48,5 +48,15 @@ class TestAtmega2560(Conformance, PinConformance):
     @pytest.fixture
     def port(self) -> Iterator[StepPort]:
         board = avr_board("atmega2560")
+        yield started(StepPort(board, SETTLE))
+        board.close()
+
+
+class TestPic18f4550(Conformance, PinConformance):
+    senses = CONVERTERS
+
+    @pytest.fixture
+    def port(self) -> Iterator[StepPort]:
+        board = pic_board()
         yield started(StepPort(board, SETTLE))
         board.close()

@@ -14,7 +14,7 @@
 
 #define RING 128u /* bytes, a power of two */
 #define RING_MASK (RING - 1u)
-#define BAUD_DIVISOR ((F_CPU + BAUD * 4UL) / (BAUD * 8UL) - 1UL)
+#define BAUD_DIVISOR (((F_CPU + (BAUD * 4UL)) / (BAUD * 8UL)) - 1UL)
 
 #define TICK_TOP 249u       /* of timer 0 at 250 kHz: 1 kHz */
 #define SERVO_PERIOD 39999u /* of timer 1 at 2 MHz: 20 ms */
@@ -33,10 +33,12 @@ static volatile uint32_t ticks;
 static volatile uint8_t stop_seen; /* milliseconds for which the button was pressed */
 
 static volatile uint8_t received[RING];
-static volatile uint8_t received_in, received_out;
+static volatile uint8_t received_in;
+static volatile uint8_t received_out;
 static volatile uint8_t overflowed;
 static volatile uint8_t unsent[RING];
-static volatile uint8_t unsent_in, unsent_out;
+static volatile uint8_t unsent_in;
+static volatile uint8_t unsent_out;
 
 static uint16_t measured[ADC_COUNT];
 static uint8_t channel;
@@ -58,7 +60,7 @@ ISR(TIMER0_OVF_vect)
 {
     ticks++;
     /* A closed contact to ground is good. Pressed, or with a broken wire, the pin is high. */
-    if (!(PIN_INPUT(STOP) & PIN_MASK(STOP))) {
+    if ((PIN_INPUT(STOP) & PIN_MASK(STOP)) == 0u) {
         stop_seen = 0u;
     } else if (stop_seen < STOP_SAMPLES) {
         stop_seen++;
@@ -77,7 +79,7 @@ ISR(USART0_RX_vect)
     uint8_t byte = UDR0;
     uint8_t next = (uint8_t)((received_in + 1u) & RING_MASK);
 
-    if ((status & (1u << DOR0)) || next == received_out) {
+    if (((status & (1u << DOR0)) != 0u) || (next == received_out)) {
         overflowed = 1u;
     }
     if (next != received_out) {
@@ -127,7 +129,7 @@ uint8_t hal_receive(uint8_t *byte)
 
 uint8_t hal_overflowed(void)
 {
-    if (!overflowed) {
+    if (overflowed == 0u) {
         return 0u;
     }
     overflowed = 0u;
@@ -162,11 +164,11 @@ uint8_t hal_read_inputs(struct inputs *inputs)
     uint8_t i;
 
     inputs->stop_button = (uint8_t)(stop_seen >= STOP_SAMPLES);
-    if (ADCSRA & (1u << ADSC)) {
+    if ((ADCSRA & (1u << ADSC)) != 0u) {
         return 0u;
     }
     measured[channel] = ADC;
-    if (channel + 1u < ADC_COUNT) {
+    if ((channel + 1u) < ADC_COUNT) {
         convert((uint8_t)(channel + 1u));
         return 0u;
     }
@@ -202,7 +204,7 @@ uint8_t hal_read_inputs(struct inputs *inputs)
             (control) = (uint8_t)((control) | (1u << (connect)));                                  \
         } else {                                                                                   \
             (control) = (uint8_t)((control) & (uint8_t)~(1u << (connect)));                        \
-            if (live) {                                                                            \
+            if ((live) != 0u) {                                                                            \
                 HIGH(enable);                                                                      \
             } else {                                                                               \
                 LOW(enable);                                                                       \
@@ -213,7 +215,7 @@ uint8_t hal_read_inputs(struct inputs *inputs)
 /* `duty` per mille of `full`, without its sign. */
 static uint8_t share(int16_t duty, uint8_t full)
 {
-    uint16_t size = (uint16_t)(duty < 0 ? -duty : duty);
+    uint16_t size = (uint16_t)((duty < 0) ? -duty : duty);
 
     return (uint8_t)(((uint32_t)size * full) / (uint16_t)MAX_DUTY);
 }
@@ -221,8 +223,8 @@ static uint8_t share(int16_t duty, uint8_t full)
 void hal_write_outputs(const struct outputs *outputs)
 {
     int16_t pulse =
-        (int16_t)(SERVO_CENTER +
-                  SERVO_DIRECTION * (int16_t)(((int32_t)outputs->steering * SERVO_COUNTS) / SERVO_ANGLE));
+        (int16_t)(SERVO_CENTER + (SERVO_DIRECTION * (int16_t)(((int32_t)outputs->steering * SERVO_COUNTS) /
+                                                              SERVO_ANGLE)));
 
     BRIDGE(outputs->left, outputs->live, LEFT_FORWARD, LEFT_BACKWARD, LEFT_PWM, OCR2A, TCCR2A,
            COM2A1, 255u);
@@ -231,7 +233,7 @@ void hal_write_outputs(const struct outputs *outputs)
     BRIDGE(outputs->pan, outputs->live, PAN_LEFT, PAN_RIGHT, PAN_PWM, OCR0B, TCCR0A, COM0B1,
            TICK_TOP);
     OCR1A = (uint16_t)pulse;
-    if (outputs->live) {
+    if (outputs->live != 0u) {
         TCCR1A = (1u << COM1A1) | (1u << WGM11);
         HIGH(LAMP);
     } else {
@@ -283,7 +285,9 @@ static void start_timers(void)
 
 static void start_line(void)
 {
-    UBRR0 = (uint16_t)BAUD_DIVISOR;
+    uint32_t divisor = BAUD_DIVISOR;
+
+    UBRR0 = (uint16_t)divisor;
     UCSR0A = 1u << U2X0;
     UCSR0C = (1u << UCSZ01) | (1u << UCSZ00);
     UCSR0B = (1u << RXCIE0) | (1u << RXEN0) | (1u << TXEN0);
@@ -293,11 +297,11 @@ static uint8_t reset_faults(void)
 {
     uint8_t faults = 0u;
 
-    if (reset_reason & (1u << WDRF)) {
+    if ((reset_reason & (1u << WDRF)) != 0u) {
         faults |= FAULT_WATCHDOG_RESET;
     }
     /* Power-up from nothing passes through brown-out as well. */
-    if ((reset_reason & (1u << BORF)) && !(reset_reason & (1u << PORF))) {
+    if (((reset_reason & (1u << BORF)) != 0u) && ((reset_reason & (1u << PORF)) == 0u)) {
         faults |= FAULT_BROWN_OUT_RESET;
     }
     return faults;

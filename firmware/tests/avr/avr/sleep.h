@@ -1,0 +1,1 @@
+#include <avr/io.h> /* all of them in one */

@@ -110,6 +110,11 @@ def survey(
             found = build(run, options, tell)
         except InputError as error:
             raise InputError(f"{recording}: {error.message}", remedy=error.remedy) from error
+    if out is not None and not found.converged:
+        raise InputError(
+            f"{recording}: the fit has not converged, {out} is not written: expected a drive round "
+            "all poles, each of them seen from several sides."
+        )
     files: dict[Path, bytes] = {}
     if out is not None:
         document = site_document(found, site, kinds, default, recording.resolve().name)

@@ -6,6 +6,7 @@ import json
 import math
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import pytest
 from polepilot.commands.main import run
 from polepilot.core.geometry import Pose2D
 from polepilot.core.landmark import Landmark
+from polepilot.core.localization import survey_work
 from polepilot.core.localization.odometry import advance
 from polepilot.core.localization.survey_align import fit_rigid
 from polepilot.core.sim.render import Renderer
@@ -150,6 +152,26 @@ def test_a_good_map_is_called_good(logged: Path, capsys: pytest.CaptureFixture[s
     shown = capsys.readouterr().out
     assert "no pole contradicts the map." in shown
     assert "WRONG" not in shown
+
+
+def test_a_fit_that_has_not_settled_writes_no_site(
+    drawn: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    solved = survey_work.solve
+    monkeypatch.setattr(
+        survey_work, "solve", lambda *words: replace(solved(*words), converged=False)
+    )
+    out = tmp_path / "site.json"
+    assert run(["survey", str(drawn), "--out", str(out)]) == 2
+    shown = capsys.readouterr()
+    assert "has not converged" in shown.err
+    assert len(shown.err.strip().splitlines()) == 1
+    assert not out.exists()
+    assert run(["survey", str(drawn), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["converged"] is False
 
 
 def test_anchors_tie_the_survey_to_a_site(

@@ -6,7 +6,7 @@ import asyncio
 import os
 import signal
 import time
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from server.fakes import SQUARE, TestClient
@@ -15,6 +15,7 @@ from polepilot.core.errors import InputError, SiteError
 from polepilot.core.vehicle import RobotModel
 from polepilot.server.errors import BusyError
 from polepilot.server.precision import Precision
+from polepilot.server.routes.common import while_waited_for
 from polepilot.server.services import Services
 
 SITES = "/api/v1/sites"
@@ -166,3 +167,32 @@ class TestProcess:
                 await precision.close()
 
         asyncio.run(use())
+
+
+def test_what_nobody_waits_for_any_more_is_given_up() -> None:
+    class Gone:
+        async def is_disconnected(self) -> bool:
+            return True
+
+    class Here:
+        async def is_disconnected(self) -> bool:
+            return False
+
+    ended: list[str] = []
+
+    async def work(seconds: float) -> str:
+        try:
+            await asyncio.sleep(seconds)
+        except asyncio.CancelledError:
+            ended.append("given up")
+            raise
+        return "done"
+
+    async def both() -> tuple[Any, Any]:
+        left = await while_waited_for(cast("Any", Gone()), work(60.0))
+        return left, await while_waited_for(cast("Any", Here()), work(0.4))
+
+    begin = time.monotonic()
+    left, waited = asyncio.run(both())
+    assert (left.status_code, waited, ended) == (503, "done", ["given up"])
+    assert time.monotonic() - begin < 30.0

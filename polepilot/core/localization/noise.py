@@ -33,7 +33,9 @@ class NoiseModel:
     skid: float = 0.004
     """Unmodelled motion in any direction, metres per square root of a metre driven."""
     range_prior: float = 0.005
-    pan_priors: tuple[float, ...] = tuple(math.radians(a) for a in (0.25, 0.4, 0.6, 0.5, 0.35, 0.25))
+    pan_priors: tuple[float, ...] = tuple(
+        math.radians(a) for a in (0.25, 0.4, 0.6, 0.5, 0.35, 0.25)
+    )
     """Of the Legendre coefficients of the potentiometer's error, from the constant on: the line is
     calibrated, what is left bends by up to 0.3 % of the range, nobody knows how."""
     pan_range: float = math.radians(135)

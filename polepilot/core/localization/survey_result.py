@@ -107,6 +107,8 @@ class Survey:
     misfit: float
     """Root mean square of what is left of the sightings, in their own standard deviations."""
     notes: tuple[str, ...] = ()
+    converged: bool = True
+    """Whether the fit has settled; otherwise its figures are not to be used."""
 
     @property
     def wrong(self) -> tuple[SurveyedPole, ...]:
@@ -127,5 +129,6 @@ class Survey:
             "path": [[stamp, *pose] for stamp, pose in self.path],
             "distortions": {name: value.to_json() for name, value in self.distortions.items()},
             "misfit": self.misfit,
+            "converged": self.converged,
             "notes": list(self.notes),
         }

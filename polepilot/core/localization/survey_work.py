@@ -61,6 +61,8 @@ class Work:
         self.state: Array
         self.covariance: Array
         self.misfit = 0.0
+        self.converged = True
+        """Whether the last fit has."""
         self.notes: list[str] = []
 
     def frame(self, options: SurveyOptions) -> tuple[Known, str]:
@@ -121,8 +123,7 @@ class Work:
         self.places = {
             k: (float(x), float(y)) for k, (x, y) in zip(problem.poles, poles, strict=True)
         }
-        if not found.converged:
-            self.notes.append("the fit has not converged: do not trust it.")
+        self.converged = found.converged
 
     def _without_dropped(self, known: Known) -> Known:
         distance = known.distance
@@ -236,6 +237,7 @@ class Work:
             distortions=_distortions(distortion, sigma),
             misfit=self.misfit,
             notes=tuple(self._all_notes(distortion, sigma)),
+            converged=self.converged,
         )
 
     def _unplaced(self, options: SurveyOptions) -> list[Unplaced]:
@@ -265,6 +267,8 @@ class Work:
 
     def _all_notes(self, distortion: Array, sigma: Array) -> list[str]:
         notes = list(dict.fromkeys(self.notes))
+        if not self.converged:
+            notes.append("the fit has not converged: do not trust it.")
         if self.cuts:
             breaks = "a break" if self.cuts == 1 else f"{self.cuts} breaks"
             notes.append(f"the recording has {breaks}: a gap, or the robot was moved by hand.")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
+from collections.abc import Awaitable
 from typing import TYPE_CHECKING, Annotated, Any
 
-from fastapi import Depends, Request
+from fastapi import Depends, Request, Response
 
 from polepilot.core.errors import InputError
 from polepilot.server.errors import PROBLEM_TYPE
@@ -44,6 +46,23 @@ if TYPE_CHECKING:
     ServicesDep = Services
 else:
     ServicesDep = Annotated[Any, Depends(get_services)]
+
+
+_LOOK = 0.25
+"""Seconds between looks whether somebody still waits."""
+
+
+async def while_waited_for(request: Request, work: Awaitable[Any]) -> Any:
+    """What ``work`` answers; it is given up when whoever asked for it leaves."""
+    task = asyncio.ensure_future(work)
+    try:
+        while not (await asyncio.wait({task}, timeout=_LOOK))[0]:
+            if await request.is_disconnected():
+                # Nobody reads this answer.
+                return Response(status_code=503)
+        return task.result()
+    finally:
+        task.cancel()
 
 
 _JSON_NAMES = {

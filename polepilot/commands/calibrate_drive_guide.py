@@ -375,7 +375,8 @@ class Guide:
             motion = self._bench.watched_by(pressed, move)
         if motion.stopped:
             self._person.say(f"  Stopped: {motion.stopped}.")
-            self._release()
+            if self._bench.state is LinkState.ESTOP:
+                self._release()
             return None
         if Faults.PROXIMITY_STOP in motion.faults:
             self._person.say("  Held back: something is near a proximity sensor.")

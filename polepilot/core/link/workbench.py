@@ -29,7 +29,7 @@ TICK = 0.02
 """Seconds between two looks at the line."""
 _RAMP = 0.4
 """After a motion the board has brought every duty back to zero within this, seconds."""
-_ANSWER = 1.0
+_ANSWER = 3.0
 """For a command to be carried out, or refused, seconds."""
 
 
@@ -227,7 +227,7 @@ class Workbench:
             )
 
     def stop(self) -> bool:
-        """Emergency stop, latched; whether the board has acknowledged it within a second."""
+        """Emergency stop, latched; whether the board has acknowledged it."""
         self._link.estop()
         self._run(_ANSWER, lambda: not self._link.estop_pending)
         return not self._link.estop_pending
@@ -253,7 +253,8 @@ class Workbench:
             elif self._link.state is LinkState.ESTOP:
                 ended = "the stop button was pressed"
             elif armed and not self._link.armed:
-                raise LinkError("The board has stopped: it missed us.", remedy="Try again.")
+                # A computer that stalled, or the cable: the next command will show.
+                ended = "the board missed us and stopped by itself"
             else:
                 act()
             return bool(ended)

@@ -30,9 +30,6 @@ def load(name: str) -> ModuleType:
 pins = load("pins")
 draw = load("draw")
 BOARDS = {board.key: board for board in draw.BOARDS}
-needs_pic = pytest.mark.skipif(
-    not (FIRMWARE / "hal" / "pic18f4550").is_dir(), reason="no firmware for it"
-)
 
 AVR = {
     "LEFT_PWM": "left_enable",
@@ -90,7 +87,6 @@ def test_arduino_pins_are_those_of_the_firmware(key: str, chip: str) -> None:
     assert chip_pins(key) == expected
 
 
-@needs_pic
 def test_pic_pins_are_those_of_the_firmware() -> None:
     source = (FIRMWARE / "hal" / "pic18f4550" / "main.c").read_text()
     ports = re.split(r"/\* Port ([A-E])\b", source.split("/* PIR1, PIE1, IPR1 */")[0])[1:]
@@ -125,7 +121,7 @@ def test_names_on_the_board_are_those_of_the_chip(key: str, names: dict[str, str
 
 @pytest.mark.parametrize(
     ("key", "name"),
-    [("uno", "BAUD"), ("mega", "BAUD"), pytest.param("pic", "PIC_BAUD", marks=needs_pic)],
+    [("uno", "BAUD"), ("mega", "BAUD"), ("pic", "PIC_BAUD")],
 )
 def test_baud_rates_are_those_of_the_firmware(key: str, name: str) -> None:
     makefile = (FIRMWARE / "Makefile").read_text()
@@ -168,7 +164,7 @@ def test_a_picture_shows_each_pin_and_writes_nothing_beyond_its_edge(key: str) -
     [
         ("atmega328p", "avrdude", ("-p atmega328p -c arduino", "-U flash:w:")),
         ("atmega2560", "avrdude", ("-p atmega2560 -c wiring -D", "-U flash:w:")),
-        pytest.param("pic18f4550", "pk2cmd", ("-PPIC18F4550", "-M -R"), marks=needs_pic),
+        ("pic18f4550", "pk2cmd", ("-PPIC18F4550", "-M -R")),
     ],
 )
 def test_flashing_is_as_the_makefile_does_it(

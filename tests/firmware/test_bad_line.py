@@ -81,6 +81,12 @@ def test_no_wrong_command_is_obeyed_and_motion_goes_on(
     # A frame is lost and counted; two that run together count once.
     lost = len(bodies) - len(obeyed)
     assert 0.7 * lost < errors < 1.3 * lost
+    print(
+        f"{seconds:.0f} s, seed {seed}: {len(bodies)} packets sent, {len(obeyed)} obeyed, "
+        f"{len(wrong)} wrong; the board counted {errors} errors, the host "
+        f"{host.statistics.crc_errors}; moving {100 * moving / ticks:.2f} % of the time, "
+        f"armed anew {rearmed} times"
+    )
     assert host.statistics.crc_errors > 0
     assert host.statistics.board_rejected == pytest.approx(errors, abs=3)
     assert rearmed < seconds / 10

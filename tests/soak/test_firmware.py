@@ -30,3 +30,4 @@ def test_libfuzzer(tmp_path: Path) -> None:
         check=False,
     )
     assert done.returncode == 0, done.stderr[-6000:]
+    print(done.stderr.splitlines()[-1])

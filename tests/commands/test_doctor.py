@@ -14,11 +14,14 @@ from typing import Any
 import pytest
 from people import BareBoard, Scripted
 
+from polepilot.commands.doctor import _connected
 from polepilot.commands.doctor_hands import try_inputs, try_outputs
 from polepilot.commands.doctor_link import LinkDoctor
 from polepilot.commands.main import run
+from polepilot.commands.stage import Stage
 from polepilot.core.link import usb
 from polepilot.core.link.messages import BoardState, Estop, Faults, Features
+from polepilot.core.link.report import Chunk
 from polepilot.core.link.workbench import Workbench
 from polepilot.core.sim.board import Board, BoardInputs, BoardSettings
 from polepilot.core.vehicle import PanUnit
@@ -335,3 +338,23 @@ def _hasty(connect: Any) -> Any:
         return connect(self, min(patience, 0.3))
 
     return in_a_moment
+
+
+def test_another_baud_rate_is_found(capsys: Captured) -> None:
+    """At the wrong rate a talking board is noise; the usual other one is tried."""
+    rig, asked = BareBoard(), []
+    noise = BareBoard()
+    noise.read = lambda: [Chunk(rig.now(), b"\xf7\x1e\x00\xe6")]  # type: ignore[method-assign]
+    noise.deaf = True
+
+    def again(rate: int) -> BareBoard:
+        asked.append(rate)
+        return rig
+
+    stage, bench = _connected(Stage(noise, rig, "ttyUSB0", None, again), 115_200)
+    with bench:
+        assert asked == [250_000]
+        assert bench.board.ok
+        assert "250000 baud: set link.baud_rate = 250000" in stage.name
+    assert noise.closed
+    assert "the front wheel may turn" in capsys.readouterr().err

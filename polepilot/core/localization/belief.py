@@ -41,12 +41,17 @@ class Belief:
         if self.status is Status.TRACKING:
             self._set(stamp, Status.DEGRADED, reason)
 
-    def judge(self, stamp: float, moving: float, sigma: float, doubted: bool) -> None:
-        """By how long it has been driven without a correction (s), and how sure it is (m)."""
+    def judge(
+        self, stamp: float, moving: float, sigma: float, doubted: bool, suspected: str = ""
+    ) -> None:
+        """By how long it has been driven without a correction (s), and how sure it is (m).
+
+        ``suspected``: why the pose may be wrong all the same; empty where it may not.
+        """
         settings = self.settings
         if self.status in (Status.LOST, Status.FIXING):
             return
-        reason = ""
+        reason = suspected
         if sigma > settings.degraded_sigma:
             reason = f"The position is known only to {100 * sigma:.0f} cm."
         elif moving > settings.degraded_after:

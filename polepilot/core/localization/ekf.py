@@ -25,6 +25,7 @@ from polepilot.core.localization.fix import Fix
 from polepilot.core.localization.noise import NoiseModel
 from polepilot.core.localization.odometry import Following, OdometryHistory, Step
 from polepilot.core.localization.stretch import Distortions, drive
+from polepilot.core.localization.suspicion import MapMisfit
 from polepilot.core.observation import RangeBearing
 
 Array = NDArray[np.float64]
@@ -144,6 +145,18 @@ class PoseFilter:
     @property
     def pose_covariance(self) -> Array:
         return self.covariance[:3, :3].copy()
+
+    @property
+    def map_misfit(self) -> MapMisfit:
+        """How far landmarks had to be moved for everything to agree."""
+        shifts = self.state[STATES:] / self.noise.survey_sigma
+        if not len(shifts):
+            return MapMisfit()
+        squares = shifts * shifts
+        worst = int(squares.argmax()) // 2
+        number = next(k for k, place in self._places.items() if place == STATES + 2 * worst)
+        left = self.covariance.diagonal()[STATES:] / self.noise.survey_sigma**2
+        return MapMisfit(float(squares.sum()), len(shifts) - float(left.sum()), number)
 
     def begin(
         self,

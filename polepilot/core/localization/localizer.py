@@ -17,7 +17,7 @@ from itertools import groupby
 from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.landmark import Landmark
 from polepilot.core.localization.belief import Belief
-from polepilot.core.localization.doubt import Doubt, Trial, largest_sigma
+from polepilot.core.localization.doubt import Doubt, Trial
 from polepilot.core.localization.ekf import PoseFilter
 from polepilot.core.localization.events import EventLog
 from polepilot.core.localization.events import LocalizerEvent as LocalizerEvent
@@ -30,6 +30,7 @@ from polepilot.core.localization.radial import RadialFilter, unfiltered
 from polepilot.core.localization.search import FixSearch
 from polepilot.core.localization.settings import LocalizerSettings as LocalizerSettings
 from polepilot.core.localization.settings import Method as Method
+from polepilot.core.localization.suspicion import Suspected, Suspicion
 from polepilot.core.localization.track import Filter, Track
 from polepilot.core.observation import Odometry, PoseEstimate, RangeBearing, Status
 from polepilot.core.vehicle import Vehicle
@@ -81,6 +82,7 @@ class Localizer:
         )
         self._doubt = Doubt(self.settings.tolerance, self.settings.method == "paper")
         self._trial = Trial()
+        self._suspicion = Suspicion(self.settings.tolerance)
         self._filter: Filter = (
             RadialFilter(vehicle.wheelbase, camera_forward)
             if self.settings.method == "paper"
@@ -151,11 +153,11 @@ class Localizer:
             return None
         ahead = self._ahead = self._predicted_to(now, track)
         covariance = ahead.filter.pose_covariance
-        self._judge(ahead)
+        suspected = self._judge(ahead)
         belief = self._belief
-        spread = self._doubt.spread
+        # Something contradicts the pose and nothing has confirmed it since, or it cannot be told.
+        spread = math.hypot(self._doubt.spread, suspected.spread)
         if spread:
-            # Something contradicts the pose and nothing has confirmed it since.
             covariance[0, 0] += spread**2
             covariance[1, 1] += spread**2
             covariance[2, 2] += (spread / 3.0) ** 2
@@ -203,6 +205,8 @@ class Localizer:
     def refix(self, reason: str) -> None:
         """Give up the pose and look for it anew; what contradicted the old one is kept."""
         track = self._track
+        if track is not None and self._belief.lost:
+            self._suspicion.lost(track.stamp)
         if self._before is not None and track is not None:
             begun, tracked, following = self._before
             if track.stamp - begun < _PROBATION:
@@ -264,7 +268,7 @@ class Localizer:
                 self._agreeing += 1
             elif gap > self.settings.tolerance:
                 self._agreeing = 0
-        if self._agreeing < _RESUMING or _sigma(track) > self.settings.degraded_sigma:
+        if self._agreeing < _RESUMING or track.sigma > self.settings.degraded_sigma:
             return False
         track.moving = 0.0
         self._accept(track, stamp, {m.landmark for m in picture})
@@ -292,7 +296,7 @@ class Localizer:
         sightings = [(m, self._landmarks[m.landmark]) for m in self._search.used]
         share = started.begin(found, stamp, sightings, self._history)
         track = Track(started, stamp, self.settings.tolerance)
-        if share < _FITTING or _sigma(track) > self.settings.degraded_sigma:
+        if share < _FITTING or track.sigma > self.settings.degraded_sigma:
             # The stricter gate left some of them out: they do not fit together so well.
             self._search.refuse("The landmarks seen so far do not fit together well enough.")
             return False
@@ -408,7 +412,7 @@ class Localizer:
         if reason:
             self._belief.lose(stamp, reason)
         if place is not None and self._others_agree(number, stamp):
-            sigma = math.hypot(_sigma(track), measurement.range * _heading_sigma(track))
+            sigma = math.hypot(track.sigma, measurement.range * track.heading_sigma)
             self._contradicted(number, stamp, place, sigma)
         return False
 
@@ -481,16 +485,9 @@ class Localizer:
         else:
             self._belief.doubt(track.stamp, judged.reason)
 
-    def _judge(self, track: Track) -> None:
+    def _judge(self, track: Track) -> Suspected:
+        misfit, moved = track.filter.map_misfit, self._health.moved
+        suspected = self._suspicion.judge(track.stamp, len(self._landmarks), moved, misfit)
         doubted = self._doubt.spread > 0.0
-        self._belief.judge(track.stamp, track.moving, _sigma(track), doubted)
-
-
-def _heading_sigma(track: Track) -> float:
-    return math.sqrt(float(track.filter.pose_covariance[2, 2]))
-
-
-def _sigma(track: Track) -> float:
-    """Of the position, along the worst direction."""
-    (xx, xy, _), (_, yy, _), _ = track.filter.pose_covariance.tolist()
-    return largest_sigma(xx, xy, yy)
+        self._belief.judge(track.stamp, track.moving, track.sigma, doubted, suspected.reason)
+        return suspected

@@ -28,6 +28,7 @@ from polepilot.core.localization.odometry import (
     Step,
     advance,
 )
+from polepilot.core.localization.suspicion import MapMisfit
 from polepilot.core.observation import RangeBearing
 
 _POSITION_PER_METRE = 0.06
@@ -78,6 +79,11 @@ class RadialFilter:
 
     def retuned(self, by: Following) -> None:
         """The history's constants were raised by so much: no matter here."""
+
+    @property
+    def map_misfit(self) -> MapMisfit:
+        """The paper takes the map for right."""
+        return MapMisfit()
 
     def begin(
         self,

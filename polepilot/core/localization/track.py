@@ -6,6 +6,7 @@ which arrives after others that were taken later is applied in its own place.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Protocol
@@ -15,8 +16,10 @@ from numpy.typing import NDArray
 
 from polepilot.core.geometry import Pose2D
 from polepilot.core.landmark import Landmark
+from polepilot.core.localization.doubt import largest_sigma
 from polepilot.core.localization.fix import Fix
 from polepilot.core.localization.odometry import Following, OdometryHistory, Step
+from polepilot.core.localization.suspicion import MapMisfit
 from polepilot.core.observation import RangeBearing
 
 Sighting = tuple[RangeBearing, Landmark]
@@ -41,6 +44,8 @@ class Filter(Protocol):
     @property
     def following_errors(self) -> Following: ...
     def retuned(self, by: Following) -> None: ...
+    @property
+    def map_misfit(self) -> MapMisfit: ...
     def begin(
         self, found: Fix, stamp: float, sightings: Sequence[Sighting], history: OdometryHistory
     ) -> float: ...
@@ -74,6 +79,16 @@ class Track:
         self.moved = -1e9
         """When it moved last."""
         self._moments: deque[_Moment] = deque(maxlen=_KEPT)
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the position along the worst direction, metres."""
+        (xx, xy, _), (_, yy, _), _ = self.filter.pose_covariance.tolist()
+        return largest_sigma(xx, xy, yy)
+
+    @property
+    def heading_sigma(self) -> float:
+        return math.sqrt(float(self.filter.pose_covariance[2, 2]))
 
     def fork(self) -> Track:
         """The same pose, to be predicted ahead; it cannot go back."""

@@ -1,0 +1,90 @@
+"""A pose that hangs together and may be wrong all the same: what cannot be told from within.
+
+Landmarks that agree with a pose have been made to agree: the filter bends the potentiometer's line
+and moves landmarks until they do. Where that takes more than there is, where too few landmarks are
+left to say which of them is wrong, or where the pose had to be found again and again, the figures
+of the filter are too good, and a person has to look.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from polepilot.core.geometry import Point
+
+_FEWEST = 3
+"""So many landmarks that agree say which one does not."""
+_TIMES, _WITHIN = 3, 60.0
+"""So often within so many seconds is more than chance."""
+_SIGMAS = 4.0
+"""The map's errors may be so many standard deviations of their sum of squares above its mean."""
+
+
+class MapMisfit(NamedTuple):
+    """How far landmarks had to be moved for everything to agree."""
+
+    squares: float = 0.0
+    """Sum of squares of the errors of their places, in standard deviations."""
+    freedom: float = 0.0
+    """What that sum should be: how many of these errors the measurements have told so far."""
+    worst: int | None = None
+    """The landmark that was moved most."""
+
+    @property
+    def improbable(self) -> bool:
+        return self.squares > self.freedom + _SIGMAS * math.sqrt(2.0 * max(self.freedom, 1.0))
+
+
+class Suspected(NamedTuple):
+    """What may be wrong, for a person, and by how much the position may be off, metres."""
+
+    reason: str = ""
+    spread: float = 0.0
+
+
+@dataclass(slots=True)
+class Suspicion:
+    """Judges what the filter itself cannot; bounded in memory."""
+
+    tolerance: float
+    """Metres by which a landmark may appear off its place."""
+    _losses: deque[float] = field(default_factory=lambda: deque(maxlen=_TIMES))
+
+    def lost(self, stamp: float) -> None:
+        """The pose was given up."""
+        self._losses.append(stamp)
+
+    def judge(
+        self, stamp: float, landmarks: int, moved: Mapping[int, Point], misfit: MapMisfit
+    ) -> Suspected:
+        """No reason where nothing is suspected.
+
+        Args:
+            landmarks: of the map.
+            moved: those found displaced, and by how much.
+            misfit: of the map, by the filter.
+        """
+        if moved and landmarks - len(moved) < _FEWEST:
+            number = next(iter(moved))
+            return Suspected(
+                f"Landmark {number} and the others contradict each other, and with so few of them "
+                "it cannot be told which one has been moved.",
+                max(math.hypot(*shift) for shift in moved.values()),
+            )
+        if misfit.improbable:
+            return Suspected(
+                "The landmarks do not stand to each other as on the map, most of all landmark "
+                f"{misfit.worst}: check the map.",
+                0.5 * self.tolerance,
+            )
+        if len(self._losses) == _TIMES and stamp - self._losses[0] < _WITHIN:
+            return Suspected(
+                f"The pose was lost and found {_TIMES} times within a minute: check the "
+                "calibration and the map.",
+                0.5 * self.tolerance,
+            )
+        return Suspected()

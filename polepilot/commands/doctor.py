@@ -105,9 +105,10 @@ def _connected(stage: Stage, baud: int) -> tuple[Stage, Workbench]:
     from polepilot.commands.stage import BAUD_RATES
     from polepilot.core.link.workbench import Workbench
 
-    typer.echo("The handshake switches the servo on: the front wheel may turn.", err=True)
     bench = Workbench(stage.port, stage.clock)
     try:
+        stage.port.read()  # opens it
+        typer.echo("The handshake switches the servo on: the front wheel may turn.", err=True)
         bench.connect()
         return replace(
             stage, name=f"{stage.name}, {baud} baud" if stage.again else stage.name

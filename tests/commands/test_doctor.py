@@ -266,8 +266,9 @@ def complaint(words: list[str], capsys: Captured, status: int) -> str:
     assert run(["doctor", *words]) == status
     captured = capsys.readouterr()
     assert captured.out == ""
-    said = captured.err.splitlines()
-    return said[-1]
+    *before, said = captured.err.splitlines()
+    assert not before or ["handshake" in line for line in before] == [True]
+    return said
 
 
 def test_the_simulated_board_as_json(capsys: Captured) -> None:

@@ -14,8 +14,8 @@ from shapely import MultiPolygon, Polygon
 
 from polepilot.core.errors import PlanError
 from polepilot.core.geometry import Pose2D, wrap_angle
-from polepilot.core.plan import PartKind, Plan, PlanPart
-from polepilot.core.planning.bumps import short_bumps, with_bumps
+from polepilot.core.plan import Plan, PlanPart
+from polepilot.core.planning.bumps import short_bumps
 from polepilot.core.planning.driver import Driver
 from polepilot.core.planning.groups import regions_of
 from polepilot.core.planning.offset import (
@@ -29,8 +29,9 @@ from polepilot.core.planning.offset import (
 from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.order import Run, ordered_runs
 from polepilot.core.planning.score import predict
+from polepilot.core.planning.sharp import Recorder, chained, path_length, sharp_path
 from polepilot.core.planning.space import FreeSpace, as_multi, free_poles, free_space, polygons
-from polepilot.core.planning.swept import swept_shape
+from polepilot.core.planning.swept import few_corners, swept_shape
 from polepilot.core.planning.track import without_jerks
 from polepilot.core.planning.unreachable import unreachable_pieces
 from polepilot.core.planning.visits import with_visits
@@ -45,18 +46,18 @@ LONGEST = 200_000.0
 """A plan longer than this would not be a day's work but a year's, metres."""
 _CLOSER = (1.0, 0.0, 0.95, 0.9)
 """Spacings that are tried; see ``nested_loops``."""
+_SOON = (2000, 600)
+"""With more corners than the first no other spacing is tried, up to the second all of them."""
+_DEAR = 10.0
+"""How much more what is missed counts than the path that would sweep it."""
 _TOUCH = 0.004
 """How much loops overlap where bumps sweep what is left between them."""
 _GAP = 0.55
 """Tool widths between the two crossings from a loop to another and back."""
 _LEAST = 0.0065
 """Missed patches smaller than this share of the tool's square get no bump."""
-_SHARE = 0.00008
-"""Nor those smaller than this share of all that is to be swept."""
 _ENOUGH = 0.0003
 """Where less than this share of all is missed, no further patch is visited."""
-_TRIFLE = 0.0001
-"""Where less than this share is missed by a path with sharp corners, it gets no further bump."""
 _MANY = 60
 _SMALLEST = 0.008
 """Missed patches below this are left, m² for a tool of 0.4 m; scaled with its square."""
@@ -91,21 +92,8 @@ def plan_scan(
     if target.area < 1e-4:
         raise PlanError("nothing of the area to scan can be reached from the start.")
     report(0.1, "loops")
-    strokes = _strokes(site, space, options, target, whole=area is None)
-    if not strokes:
-        strokes = [_least_stroke(space)]
-    report(0.3, "order")
-    runs = ordered_runs(
-        strokes,
-        space.start.position,
-        space,
-        options.order,
-        reach=options.tool_width,
-        gap=0.0 if options.min_turn_radius > 0 else _GAP * options.tool_width,
-    )
-    report(0.5, "path")
     notes = [*site.repairs, *space.notes]
-    path, gear, parts = _path(runs, space, options, target, notes)
+    path, gear, parts = _shortest(site, space, options, target, area is None, notes, report)
     report(0.8, "unreachable parts")
     pieces = unreachable_pieces(space, reachable)
     report(0.9, "prediction")
@@ -125,6 +113,48 @@ def plan_scan(
         notes=tuple(notes),
         runtime=time.perf_counter() - began,
     )
+
+
+def _shortest(
+    site: Site,
+    space: FreeSpace,
+    options: PlanOptions,
+    target: MultiPolygon,
+    whole: bool,
+    notes: list[str],
+    report: Progress,
+) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
+    """The path; on maps where that is soon done the shortest for some spacings of the loops."""
+    plain = options.min_turn_radius <= 0
+    best: tuple[Points, Gears, tuple[PlanPart, ...]] | None = None
+    least = math.inf
+    spacings = [_CLOSER[:2], *((closer,) for closer in _CLOSER[2:])] if plain else [_CLOSER]
+    for spacing in spacings:
+        strokes = _strokes(site, space, options, target, whole, spacing)
+        if not strokes:
+            strokes = [_least_stroke(space)]
+        report(0.3, "order")
+        runs = ordered_runs(
+            strokes,
+            space.start.position,
+            space,
+            options.order,
+            reach=options.tool_width,
+            gap=0.0 if options.min_turn_radius > 0 else _GAP * options.tool_width,
+        )
+        report(0.5, "path")
+        found = _path(runs, space, options, target, notes if best is None else [])
+        corners = len(few_corners(found[0]))
+        if not plain or not whole or options.order == "paper" or corners > _SOON[0]:
+            return best or found
+        missed = target.difference(swept_shape(found[0], options.tool_width)).area
+        cost = path_length(found[0]) + _DEAR * missed / options.tool_width
+        if cost < least:
+            best, least = found, cost
+        if corners > _SOON[1]:
+            break
+    assert best is not None  # there is at least one spacing
+    return best
 
 
 def _least_stroke(space: FreeSpace) -> Stroke:
@@ -149,7 +179,12 @@ def _silent(share: float, what: str) -> None:
 
 
 def _strokes(
-    site: Site, space: FreeSpace, options: PlanOptions, target: MultiPolygon, whole: bool
+    site: Site,
+    space: FreeSpace,
+    options: PlanOptions,
+    target: MultiPolygon,
+    whole: bool,
+    spacings: tuple[float, ...],
 ) -> list[Stroke]:
     """Loops and clean-up passes for ``target``; for patches only passes and what loops cross it."""
     tool = options.tool_width
@@ -168,7 +203,7 @@ def _strokes(
     best: list[Stroke] = []
     least = math.inf
     plain = options.min_turn_radius <= 0
-    for closer in _CLOSER[:2] if plain else _CLOSER:
+    for closer in spacings:
         loops = nested_loops(pieces, tool, tolerance, closer, _TOUCH if plain else OVERLAP)
         strokes = _completed(loops, space, target, tool, smallest, bumps=plain)
         # Each clean-up pass has to be gone to and left again.
@@ -233,21 +268,6 @@ def _patch_strokes(
     return strokes
 
 
-class _Recorder:
-    """Collects the parts of a path while it grows."""
-
-    def __init__(self) -> None:
-        self.parts: list[PlanPart] = []
-
-    def close(self, kind: PartKind, last: int) -> None:
-        first = self.parts[-1].last if self.parts else 0
-        if last > first:
-            if self.parts and self.parts[-1].kind == kind and kind != "loop":
-                self.parts[-1] = PlanPart(kind, self.parts[-1].first, last)
-            else:
-                self.parts.append(PlanPart(kind, first, last))
-
-
 def _path(
     runs: list[Run],
     space: FreeSpace,
@@ -256,55 +276,9 @@ def _path(
     notes: list[str],
 ) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
     if options.min_turn_radius <= 0:
-        path, _, parts = _plain_path(runs, space, options, notes)
-        tool = options.tool_width
-        for _ in range(2):
-            missed = target.difference(swept_shape(path, tool))
-            path, parts = with_bumps(
-                path,
-                parts,
-                target,
-                missed,
-                space,
-                tool,
-                min(_LEAST * tool**2, _SHARE * target.area),
-                _TRIFLE * target.area,
-                options.order == "paper",
-            )
+        path, parts = sharp_path(runs, space, options, target, notes)
         return path, np.ones(len(path) - 1, np.int8), parts
     return _driven_path(runs, space, options, target, notes)
-
-
-def _plain_path(
-    runs: list[Run], space: FreeSpace, options: PlanOptions, notes: list[str]
-) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
-    """Corners as sharp as they come, all forward."""
-    blocks: list[Points] = [np.array([space.start.position])]
-    recorder = _Recorder()
-    count = 1
-    for run in runs:
-        here = (float(blocks[-1][-1, 0]), float(blocks[-1][-1, 1]))
-        there = (float(run.points[0, 0]), float(run.points[0, 1]))
-        if math.dist(here, there) > 1e-6:
-            way = space.shortest_path(here, there)
-            if way is None:
-                x, y = there
-                notes.append(f"no way was found to a pass at ({x:.2f}, {y:.2f}); it is left out.")
-                continue
-            blocks.append(np.array(way[1:]))
-            count += len(way) - 1
-            recorder.close(_connection(way, options) if recorder.parts else "link", count - 1)
-        blocks.append(run.points[1:])
-        count += len(run.points) - 1
-        recorder.close("loop" if run.stroke.closed else "cleanup", count - 1)
-    path = np.vstack(blocks)
-    return path, np.ones(len(path) - 1, np.int8), tuple(recorder.parts)
-
-
-def _connection(way: list[tuple[float, float]], options: PlanOptions) -> PartKind:
-    """A bridge joins neighbouring loops; anything longer is a link."""
-    length = sum(math.dist(a, b) for a, b in pairwise(way))
-    return "bridge" if len(way) == 2 and length <= 1.6 * options.tool_width else "link"
 
 
 def _driven_path(
@@ -315,12 +289,12 @@ def _driven_path(
     notes: list[str],
 ) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
     """Followable by a steered wheel; what its curves miss is visited at the end."""
-    driver, recorder, least = None, _Recorder(), math.inf
+    driver, recorder, least = None, Recorder(), math.inf
     for heading in _headings(space, runs):
         trial = Driver(
             space, options.min_turn_radius, Pose2D(space.start.x, space.start.y, heading)
         )
-        record = _Recorder()
+        record = Recorder()
         _drive(trial, runs, record, options)
         path, _ = trial.track.arrays()
         left = target.difference(swept_shape(path, options.tool_width)).area
@@ -337,7 +311,7 @@ def _driven_path(
         if not more:
             break
         pose = driver.track.pose
-        _drive(driver, _nearest_first(more, pose.position), recorder, options)
+        _drive(driver, chained(more, pose.position), recorder, options)
     path, gear = driver.track.arrays()
     parts = tuple(recorder.parts)
     if len(path) > 1:
@@ -390,7 +364,7 @@ def _headings(space: FreeSpace, runs: list[Run]) -> list[float]:
     return [wrap_angle(along + turn * math.pi / 2) for turn in (0, 2, 1, 3)]
 
 
-def _drive(driver: Driver, runs: list[Run], recorder: _Recorder, options: PlanOptions) -> None:
+def _drive(driver: Driver, runs: list[Run], recorder: Recorder, options: PlanOptions) -> None:
     """Drives the runs; leaves out what cannot be reached or followed."""
     for run in runs:
         here = driver.track.pose.position
@@ -403,19 +377,3 @@ def _drive(driver: Driver, runs: list[Run], recorder: _Recorder, options: PlanOp
         recorder.close("bridge" if near else "link", driver.track.last)
         driver.follow(points)
         recorder.close("loop" if run.stroke.closed else "cleanup", driver.track.last)
-
-
-def _nearest_first(strokes: list[Stroke], here: tuple[float, float]) -> list[Run]:
-    """Open passes, always the nearest end next."""
-    rest = list(strokes)
-    runs: list[Run] = []
-    while rest:
-        best, flip = min(
-            ((stroke, flip) for stroke in rest for flip in (False, True)),
-            key=lambda entry: math.dist(here, entry[0].points[-1 if entry[1] else 0]),
-        )
-        rest.remove(best)
-        points = best.points[::-1].copy() if flip else best.points
-        here = (float(points[-1, 0]), float(points[-1, 1]))
-        runs.append(Run(points, best, whole=False))
-    return runs

@@ -154,7 +154,7 @@ def cleanup_strokes(
         along, across = corners[1] - corners[0], corners[2] - corners[1]
         length, width = float(np.hypot(*along)), float(np.hypot(*across))
         if width > 0.9 * tool_width and cuts:
-            if length > 1.5 * width and patch.area > 0.7 * length * width:
+            if length > 1.5 * width and patch.area > 0.85 * tool_width * length:
                 middle = corners[0] + across / 2  # passes side by side
                 cut = Polygon([corners[0], corners[1], middle + along, middle])
             else:

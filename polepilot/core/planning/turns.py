@@ -79,6 +79,7 @@ def _left_turns(turn: float, radius: float) -> tuple[Turn, ...]:
     legs = radius * math.tan(min(abs(turn), math.radians(120)) / 2)
     out = np.array([math.cos(turn), math.sin(turn)])
     ways: list[Turn] = []
+    least = _SHORTEST if abs(turn) * radius > _SHORTEST else 0.0
 
     def add(first: float, last: float, visit: bool, finish: bool) -> None:
         """From ``first`` on the way in to ``last`` on the way out, in shares of ``legs``.
@@ -90,7 +91,7 @@ def _left_turns(turn: float, radius: float) -> tuple[Turn, ...]:
         start = Pose2D(first, 0.0, 0.0)
         end = Pose2D(last * math.cos(turn), last * math.sin(turn), wrap_angle(turn))
         for curve in shortest_curves(start, end, radius, CHANGE)[:4]:
-            if any(abs(length) < _SHORTEST for _, length in curve):
+            if any(abs(length) < least for _, length in curve):
                 continue
             checks: list[Points] = []
             if not visit and first < 0:

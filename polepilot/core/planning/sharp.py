@@ -1,0 +1,184 @@
+"""A path with corners as sharp as they come: runs joined, one last strip, bumps for the rest."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon
+
+from polepilot.core.plan import PartKind, PlanPart
+from polepilot.core.planning.bumps import with_bumps
+from polepilot.core.planning.offset import Points, Stroke, cleanup_strokes
+from polepilot.core.planning.options import PlanOptions
+from polepilot.core.planning.order import Run
+from polepilot.core.planning.space import FreeSpace, polygons
+from polepilot.core.planning.swept import few_corners, swept_shape
+from polepilot.core.planning.trim import trimmed
+
+_LEAST = 0.0065
+"""Missed patches smaller than this share of the tool's square get no bump."""
+_SHARE = 0.00008
+"""Nor those smaller than this share of all that is to be swept."""
+_TRIFLE = 0.0001
+"""Where less than this share is missed by a path with sharp corners, it gets no further bump."""
+_STRIP = 5.0
+"""A missed patch longer than so many tool widths may be driven along at the end."""
+_BUMPY = 1.5
+"""So many times its length it costs, about, to sweep a strip by bumps."""
+_STARTS = 12
+_MOST_CORNERS = 2000
+"""A path with more corners than this is not driven along its longest strip."""
+
+
+def sharp_path(
+    runs: list[Run],
+    space: FreeSpace,
+    options: PlanOptions,
+    target: MultiPolygon,
+    notes: list[str],
+) -> tuple[Points, tuple[PlanPart, ...]]:
+    """Corners as sharp as they come, all forward; with bumps to what is missed."""
+    tool = options.tool_width
+    smallest = min(_LEAST * tool**2, _SHARE * target.area)
+    path, parts = _joined_runs(runs, space, options, notes)
+    if options.order != "paper":
+        ways = [trimmed(path, parts, target, tool, 3 * smallest)]
+        if runs[-1].whole:
+            # Its end may be swept already if the last loop is driven the other way round.
+            turned = [*runs[:-1], replace(runs[-1], points=runs[-1].points[::-1].copy())]
+            ways.append(
+                trimmed(*_joined_runs(turned, space, options, []), target, tool, 3 * smallest)
+            )
+        path, parts = min(ways, key=lambda way: path_length(way[0]))
+    if options.order != "paper" and len(few_corners(path)) <= _MOST_CORNERS:
+        strip = _longest_strip(target.difference(swept_shape(path, tool)), tool)
+        if strip is not None:
+            # The longest strip that loops leave is driven once, and nothing leads back from there.
+            passes = cleanup_strokes(strip, tool, space, smallest)
+            end = (float(path[-1, 0]), float(path[-1, 1]))
+            longer = _joined_runs(chained(passes, end), space, options, [], path, parts)
+            longer = trimmed(*longer, target, tool, 3 * smallest)
+            if path_length(longer[0]) - path_length(path) < _BUMPY * strip.length / 2:
+                path, parts = longer
+    return _with_bumps(path, parts, space, options, target)
+
+
+def _with_bumps(
+    path: Points,
+    parts: tuple[PlanPart, ...],
+    space: FreeSpace,
+    options: PlanOptions,
+    target: MultiPolygon,
+) -> tuple[Points, tuple[PlanPart, ...]]:
+    """The path with bumps to what it misses, and to what those miss."""
+    tool = options.tool_width
+    for _ in range(2):
+        path, parts = with_bumps(
+            path,
+            parts,
+            target,
+            target.difference(swept_shape(path, tool)),
+            space,
+            tool,
+            min(_LEAST * tool**2, _SHARE * target.area),
+            _TRIFLE * target.area,
+            options.order == "paper",
+        )
+    return path, parts
+
+
+def chained(strokes: list[Stroke], here: tuple[float, float]) -> list[Run]:
+    """Open passes in that order, always the nearest end next, which has the shortest gaps."""
+    ends = np.array([[stroke.points[0], stroke.points[-1]] for stroke in strokes])
+    between = np.hypot(*np.moveaxis(ends[:, :, None, None] - ends[None, None], -1, 0))
+    between[np.arange(len(ends)), :, np.arange(len(ends))] = math.inf
+    lonely = np.round(between.min(axis=(2, 3)), 6).ravel()
+    best: list[tuple[int, int]] = []
+    least = math.inf
+    for start in np.argsort(-lonely, kind="stable")[:_STARTS].tolist():
+        order = [(start // 2, start % 2)]
+        waiting = np.ones(len(strokes), dtype=bool)
+        waiting[start // 2] = False
+        gaps = math.dist(here, ends[start // 2, start % 2])
+        while waiting.any():
+            distances = between[order[-1][0], 1 - order[-1][1]].copy()
+            distances[~waiting] = math.inf
+            index, side = divmod(int(np.argmin(np.round(distances, 6))), 2)
+            order.append((index, side))
+            gaps += float(distances[index, side])
+            waiting[index] = False
+        if gaps < least:
+            best, least = order, gaps
+    return [
+        Run(strokes[i].points[::-1].copy() if flip else strokes[i].points, strokes[i], False)
+        for i, flip in best
+    ]
+
+
+def _longest_strip(missed: shapely.Geometry, tool: float) -> MultiPolygon | None:
+    """The longest missed patch, if it is worth to be driven along."""
+    opened = missed.buffer(-0.004, quad_segs=2).buffer(0.004, quad_segs=2)
+    longest = max(polygons(opened), key=lambda patch: float(patch.length), default=None)
+    if longest is None or longest.length / 2 < _STRIP * tool:
+        return None
+    return MultiPolygon([longest])
+
+
+def path_length(path: Points) -> float:
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+
+def _joined_runs(
+    runs: list[Run],
+    space: FreeSpace,
+    options: PlanOptions,
+    notes: list[str],
+    path: Points | None = None,
+    parts: tuple[PlanPart, ...] = (),
+) -> tuple[Points, tuple[PlanPart, ...]]:
+    """The runs with the ways between them, after ``path`` if there is one."""
+    blocks: list[Points] = [np.array([space.start.position]) if path is None else path]
+    recorder = Recorder()
+    recorder.parts += parts
+    count = len(blocks[0])
+    for run in runs:
+        here = (float(blocks[-1][-1, 0]), float(blocks[-1][-1, 1]))
+        there = (float(run.points[0, 0]), float(run.points[0, 1]))
+        if math.dist(here, there) > 1e-6:
+            way = space.shortest_path(here, there)
+            if way is None:
+                x, y = there
+                notes.append(f"no way was found to a pass at ({x:.2f}, {y:.2f}); it is left out.")
+                continue
+            blocks.append(np.array(way[1:]))
+            count += len(way) - 1
+            recorder.close(_connection(way, options) if recorder.parts else "link", count - 1)
+        blocks.append(run.points[1:])
+        count += len(run.points) - 1
+        recorder.close("loop" if run.stroke.closed else "cleanup", count - 1)
+    return np.vstack(blocks), tuple(recorder.parts)
+
+
+def _connection(way: list[tuple[float, float]], options: PlanOptions) -> PartKind:
+    """A bridge joins neighbouring loops; anything longer is a link."""
+    length = sum(math.dist(a, b) for a, b in pairwise(way))
+    return "bridge" if len(way) == 2 and length <= 1.6 * options.tool_width else "link"
+
+
+class Recorder:
+    """Collects the parts of a path while it grows."""
+
+    def __init__(self) -> None:
+        self.parts: list[PlanPart] = []
+
+    def close(self, kind: PartKind, last: int) -> None:
+        first = self.parts[-1].last if self.parts else 0
+        if last > first:
+            if self.parts and self.parts[-1].kind == kind and kind != "loop":
+                self.parts[-1] = PlanPart(kind, self.parts[-1].first, last)
+            else:
+                self.parts.append(PlanPart(kind, first, last))

@@ -7,7 +7,7 @@ import re
 import subprocess
 
 import pytest
-from firmware.boards import BUILD, CHIPS, PIC, make
+from firmware.boards import BUILD, CHIPS, FIRMWARE, PIC, make
 
 
 def test_unit_tests_and_vectors() -> None:
@@ -42,6 +42,26 @@ def fuzz(seed: int, count: int) -> None:
 
 def test_analyzer_and_cppcheck_are_content() -> None:
     make("check", of="check")
+
+
+def test_each_deviation_from_misra_is_told_with_its_reason() -> None:
+    rules = re.findall(
+        r"^misra-c2012-([\d.]+)", (FIRMWARE / "tests/misra.txt").read_text(), re.MULTILINE
+    )
+    page = (FIRMWARE / "README.md").read_text("utf-8")
+    told = re.findall(r"^\| (\d+\.\d+) \| [^|]+ \| [^|]{20,} \|$", page, re.MULTILINE)
+    assert len(rules) >= 1
+    assert sorted(told) == sorted(rules)
+
+
+def test_what_the_stand_ins_name_is_what_the_compilers_name() -> None:
+    """A register's name that only tests/xc8 had would compile nowhere else."""
+    names = re.findall(
+        r"REGISTER\(0x\w+, (\w+)\)", (FIRMWARE / "hal/pic18f4550/registers.h").read_text()
+    )
+    stand_in = (FIRMWARE / "tests/xc8/xc.h").read_text()
+    declared = re.findall(r"\b[A-Z]\w+\b", " ".join(re.findall(r"uint8_t (.*);", stand_in)))
+    assert sorted(names) == sorted(declared)
 
 
 @pytest.mark.parametrize("chip", CHIPS)

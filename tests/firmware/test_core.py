@@ -66,7 +66,6 @@ def test_what_the_stand_ins_name_is_what_the_compilers_name() -> None:
 
 @pytest.mark.parametrize("chip", CHIPS)
 def test_half_of_the_chip_is_free(chip: str) -> None:
-    (BUILD / chip / "polepilot.hex").unlink(missing_ok=True)
     said = make(chip, of="pic" if chip == PIC else "avr")
     shares = re.search(
         rf"^{chip}: flash \d+ of \d+ bytes \((\d+) %\), RAM \d+ of \d+ bytes \((\d+) %\)$",

@@ -20,7 +20,7 @@ _WITNESSED = 3
 """The same where another landmark was in its place before and after them."""
 _SUSPICION = 10.0
 """Seconds for which a landmark that contradicted has to be in its place to be believed."""
-_KNOWN = 0.03
+_KNOWN = 0.045
 """Metres to which the best of these few must be known."""
 _SPAN = 2.0
 """Seconds between the first and the last of them: more than one pass of the camera."""

@@ -44,11 +44,12 @@
 /* PIR2, PIE2, IPR2 */
 #define OF_TIMER3 0x02u
 
-#define OERR 0x02u    /* RCSTA: bytes were lost */
-#define CREN 0x10u    /* RCSTA: receive */
-#define GO 0x02u      /* ADCON0: converting */
-#define PWM_ON 0x0Cu  /* CCPxCON */
-#define RUNNING 0x01u /* T3CON */
+#define TRANSMIT 0x40u /* RC6: the line */
+#define OERR 0x02u     /* RCSTA: bytes were lost */
+#define CREN 0x10u     /* RCSTA: receive */
+#define GO 0x02u       /* ADCON0: converting */
+#define PWM_ON 0x0Cu   /* CCPxCON */
+#define RUNNING 0x01u  /* T3CON */
 
 #define TIMER3_PER_MS 1500u
 #define PAN_LEAST 60u /* counts: what is shorter cannot be cut by an interrupt */
@@ -377,12 +378,12 @@ static uint8_t reset_faults(void)
 static void start_pins(void)
 {
     LATB = 0u;
-    LATC = 0u;
+    LATC = TRANSMIT; /* the line rests high */
     LATD = 0u;
     ADCON1 = 0x0Au; /* AN0 to AN4 are analog, against the supply */
     CMCON = 0x07u;  /* no comparators */
     TRISB = (uint8_t)~PAN_ENABLE;
-    TRISC = (uint8_t)~(SERVO | LEFT_ENABLE | RIGHT_ENABLE);
+    TRISC = (uint8_t)~(SERVO | LEFT_ENABLE | RIGHT_ENABLE | TRANSMIT);
     TRISD = 0x40u;
     INTCON2 &= (uint8_t)~0x80u; /* pull-ups on port B, for the stop button */
 }

@@ -92,6 +92,5 @@ REGISTER(0xFFC, STKPTR);
 #pragma config STVREN = ON
 #pragma config LVP = OFF
 #pragma config XINST = OFF
-#pragma config DEBUG = OFF
 
 #endif

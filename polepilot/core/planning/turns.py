@@ -44,14 +44,27 @@ class Turn:
     """Where on the way out it ends; negative: before the corner."""
     curve: Curve
     """From ``lead`` to ``stop``."""
-    points: Points
-    """The curve's points, M x 2, from the corner on where that is visited."""
+    radius: float
+
+    @property
+    def points(self) -> Points:
+        """The curve's points, M x 2, from the corner on where that is visited."""
+        if self.visit:
+            begin, curve = 0.0, joined((("S", self.lead), *self.curve))
+        else:
+            begin, curve = self.lead, self.curve
+        return _points(begin, curve, self.radius)
 
     def after(self, before: float) -> Curve:
         """The whole curve for a corner that lies ``before`` metres ahead."""
         if self.visit:
             return joined((("S", before), ("S", self.lead), *self.curve))
         return joined((("S", before + self.lead), *self.curve))
+
+
+@lru_cache(maxsize=20_000)
+def _points(begin: float, curve: Curve, radius: float) -> Points:
+    return sample(Pose2D(begin, 0.0, 0.0), curve, radius)[0]
 
 
 def turns_round(turn: float, radius: float) -> tuple[Turn, ...]:
@@ -67,7 +80,6 @@ def _right_turns(turn: float, radius: float) -> tuple[Turn, ...]:
         replace(
             way,
             curve=tuple((side[kind], length) for kind, length in way.curve),
-            points=way.points * (1.0, -1.0),
         )
         for way in _left_turns(turn, radius)
     )
@@ -107,10 +119,7 @@ def _left_turns(turn: float, radius: float) -> tuple[Turn, ...]:
                 cut = float(np.max(shapely.distance(line, shapely.points(np.array(checks)))))
             whole: Curve = (*curve, ("S", -last)) if finish else curve
             stop = 0.0 if finish else last
-            begin = Pose2D(0.0, 0.0, 0.0) if visit else start
-            curve_here = (("S", first), *whole) if visit else whole
-            points = sample(begin, joined(curve_here), radius)[0]
-            way = Turn(0.0, cut, first, visit, stop, joined(whole), points)
+            way = Turn(0.0, cut, first, visit, stop, joined(whole), radius)
             cost = curve_cost(way.after(10.0)) - 10.0 - stop + 20 * min(cut, 0.5) ** 2
             ways.append(replace(way, cost=cost))
 

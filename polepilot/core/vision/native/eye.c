@@ -14,7 +14,7 @@
 #define USUAL_TINT 0.17        /* as in eye_strip, */
 #define USUAL_SHARP_TINT 0.28  /* and where colour is blurred: beside the strip and between its segments */
 #define USUAL_SIGMA 0.0040      /* of the unit, as a share of it */
-#define USUAL_DOUBT 1.5         /* rest of an end bar as paint, over its rest as what is behind it */
+#define USUAL_DOUBT 0.35        /* rest of an end bar as paint, over its rest as what is behind it */
 #define SURE 6e-4              /* share of the unit: no second fit makes it better */
 #define SHARP 5.0              /* rows per segment: blurred colour still parts them */
 #define FAR 4.0                /* rows per segment: */

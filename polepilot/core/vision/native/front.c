@@ -28,6 +28,7 @@
 #define STANDS_OUT_ONE 0.5 /* at one so that nothing is missing */
 #define OTHER_BLACK 0.04   /* of bright - dark, and times the spread of the other dark segments: */
 #define OTHER_SPREAD 3.0
+#define OTHER_PAINT 0.25   /* of bright - dark; gloss and shade differ by less */
 #define SWELLS 0.45        /* columns by which a side stands out, and times as much elsewhere: */
 #define SWELLS_SPREAD 3.0
 #define BACKGROUND 0.25 /* of bright - dark: least light behind against which a side shows */
@@ -212,6 +213,18 @@ static double other_black(const scene *s, int i)
     return at_most(off / (OTHER_BLACK + OTHER_SPREAD * spread));
 }
 
+/* Whether a bright bit's paint is another one than that of the end bars: evidence. */
+static double other_paint(const scene *s, int i)
+{
+    double most = 0, share = (i - 0.5) / (s->segments - 2.0);
+    for (int c = 0; c < s->channels; c++) {
+        double first = (s->levels[0][c] + s->levels[1][c]) / 2;
+        double last = (s->levels[s->segments - 1][c] + s->levels[s->segments - 2][c]) / 2;
+        most = fmax(most, fabs(s->levels[i][c] - first - share * (last - first)));
+    }
+    return at_most(most / (OTHER_PAINT * s->contrast));
+}
+
 /* How far each side stands out at every segment. In the channel in which the paint is darkest, bright
  * and dark segments have the same sides. */
 static void know_sides(scene *s, const eye_task *task)
@@ -326,8 +339,6 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
     if (s.contrast <= 0 || scale->unit < LEAST_UNIT)
         return 0;
     for (int i = 3; i < segments - 3; i += 2) {
-        if (code[i] == '1')
-            continue;
         if (!filled) {
             for (int way = 0; way < 2; way++)
                 fill_margin(p, u, side, &s, task->low, way ? 1 : -1, s.beside + way);
@@ -337,12 +348,17 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
             filled = 1;
         }
         int from = i, to = i + 1;
-        while (code[from - 1] == '0')
-            from--;
-        while (code[to] == '0')
-            to++;
-        double evidence = goes_on(&s, i, from, to) + other_black(&s, i) +
-                          (rows ? step(&s, u, from, to) : 0);
+        double evidence = 0;
+        if (code[i] == '1') {
+            evidence = goes_on(&s, i, from, to) + other_paint(&s, i);
+        } else {
+            while (code[from - 1] == '0')
+                from--;
+            while (code[to] == '0')
+                to++;
+            evidence = goes_on(&s, i, from, to) + other_black(&s, i) +
+                       (rows ? step(&s, u, from, to) : 0);
+        }
         if (sides && evidence <= ENOUGH)
             evidence += swells(&s, i, from, to);
         if (evidence > ENOUGH)

@@ -10,7 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
-from firmware.boards import HOST, avr_board, make
+from firmware.boards import HOST, PIC, chip_board, make
 
 from polepilot.commands.simulation import Simulation, SimulationResult
 from polepilot.core.geometry import Pose2D
@@ -120,8 +120,9 @@ def test_a_tour_of_the_workshop(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_route_through_machine_code(tmp_path: Path) -> None:
-    """Every byte and every pin of the ATmega328P; its rangers see 80 cm far."""
+@pytest.mark.parametrize("chip", ["atmega328p", PIC])
+def test_a_route_through_machine_code(tmp_path: Path, chip: str) -> None:
+    """Every byte and every pin of the chip; its rangers see 80 cm far."""
     site = parse_site(SMALL, "small")
     plan = plan_route(site, "Across", options())
-    compare(site, plan, 1, tmp_path, lambda: avr_board("atmega328p"), SHORT_SIGHTED)
+    compare(site, plan, 1, tmp_path, lambda: chip_board(chip), SHORT_SIGHTED)

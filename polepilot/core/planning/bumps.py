@@ -38,13 +38,21 @@ _MOST_CUTS = 7
 """How often a patch is halved until one place sweeps each piece."""
 
 
+def bumps_length(patch: Polygon, tool: float) -> float:
+    """How much longer bumps along a patch make a path, about, metres."""
+    radius = tool / 2
+    length = float(patch.length) / 2
+    width = float(patch.area) / max(length, 1e-9)
+    return length / (_PITCH * radius) * 2 * (width + (1 - _RISE) * radius)
+
+
 def short_bumps(patch: Polygon, tool: float) -> bool:
     """Whether bumps along a patch are shorter than to drive along it and back."""
     radius = tool / 2
     length = float(patch.length) / 2
     width = float(patch.area) / max(length, 1e-9)
-    bumps = length / (_PITCH * radius) * 2 * (width + (1 - _RISE) * radius)
-    return bumps < 2 * max(length - radius, 0.0) + 2 * (radius + width / 2)
+    there_and_back = 2 * max(length - radius, 0.0) + 2 * (radius + width / 2)
+    return bumps_length(patch, tool) < there_and_back
 
 
 def with_bumps(

@@ -29,7 +29,7 @@ from polepilot.core.planning.offset import (
 from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.order import Run, ordered_runs
 from polepilot.core.planning.score import predict
-from polepilot.core.planning.sharp import Recorder, chained, path_length, sharp_path
+from polepilot.core.planning.sharp import Recorder, chained, path_cost, sharp_path
 from polepilot.core.planning.space import FreeSpace, as_multi, free_poles, free_space, polygons
 from polepilot.core.planning.swept import few_corners, swept_shape
 from polepilot.core.planning.track import without_jerks
@@ -48,8 +48,6 @@ _CLOSER = (1.0, 0.0, 0.95, 0.9)
 """Spacings that are tried; see ``nested_loops``."""
 _SOON = (2000, 600)
 """With more corners than the first no other spacing is tried, up to the second all of them."""
-_DEAR = 10.0
-"""How much more what is missed counts than the path that would sweep it."""
 _TOUCH = 0.004
 """How much loops overlap where bumps sweep what is left between them."""
 _GAP = 0.55
@@ -147,8 +145,7 @@ def _shortest(
         corners = len(few_corners(found[0]))
         if not plain or not whole or options.order == "paper" or corners > _SOON[0]:
             return best or found
-        missed = target.difference(swept_shape(found[0], options.tool_width)).area
-        cost = path_length(found[0]) + _DEAR * missed / options.tool_width
+        cost = path_cost(found[0], target, options.tool_width)
         if cost < least:
             best, least = found, cost
         if corners > _SOON[1]:

@@ -11,7 +11,7 @@ import shapely
 from shapely import MultiPolygon
 
 from polepilot.core.plan import PartKind, PlanPart
-from polepilot.core.planning.bumps import with_bumps
+from polepilot.core.planning.bumps import bumps_length, with_bumps
 from polepilot.core.planning.offset import Points, Stroke, cleanup_strokes
 from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.order import Run
@@ -27,8 +27,14 @@ _TRIFLE = 0.0001
 """Where less than this share is missed by a path with sharp corners, it gets no further bump."""
 _STRIP = 5.0
 """A missed patch longer than so many tool widths may be driven along at the end."""
-_BUMPY = 1.5
-"""So many times its length it costs, about, to sweep a strip by bumps."""
+_ABOUT = 1.5
+"""How far the length of bumps may be from what is expected, either way."""
+_LONG = 100
+"""Strips around which it is more tool widths than this are not tried out both ways."""
+_FEW_CORNERS = 600
+"""Up to so many it is tried out what is shorter."""
+_DEAR = 10.0
+"""How much more what is missed counts than the path that would sweep it."""
 _STARTS = 12
 _MOST_CORNERS = 2000
 """A path with more corners than this is not driven along its longest strip."""
@@ -54,17 +60,32 @@ def sharp_path(
                 trimmed(*_joined_runs(turned, space, options, []), target, tool, 3 * smallest)
             )
         path, parts = min(ways, key=lambda way: path_length(way[0]))
-    if options.order != "paper" and len(few_corners(path)) <= _MOST_CORNERS:
-        strip = _longest_strip(target.difference(swept_shape(path, tool)), tool)
-        if strip is not None:
-            # The longest strip that loops leave is driven once, and nothing leads back from there.
-            passes = cleanup_strokes(strip, tool, space, smallest)
-            end = (float(path[-1, 0]), float(path[-1, 1]))
-            longer = _joined_runs(chained(passes, end), space, options, [], path, parts)
-            longer = trimmed(*longer, target, tool, 3 * smallest)
-            if path_length(longer[0]) - path_length(path) < _BUMPY * strip.length / 2:
-                path, parts = longer
-    return _with_bumps(path, parts, space, options, target)
+    corners = len(few_corners(path))
+    if options.order == "paper" or corners > _MOST_CORNERS:
+        return _with_bumps(path, parts, space, options, target)
+    strip = _longest_strip(target.difference(swept_shape(path, tool)), tool)
+    if strip is None:
+        return _with_bumps(path, parts, space, options, target)
+    # The longest strip that loops leave is driven once, and nothing leads back from there.
+    passes = cleanup_strokes(strip, tool, space, smallest)
+    end = (float(path[-1, 0]), float(path[-1, 1]))
+    longer = _joined_runs(chained(passes, end), space, options, [], path, parts)
+    longer = trimmed(*longer, target, tool, 3 * smallest)
+    more = path_length(longer[0]) - path_length(path)
+    bumpy = bumps_length(strip.geoms[0], tool)
+    tried = corners <= _FEW_CORNERS and strip.length < _LONG * tool
+    found = []
+    if more < _ABOUT * bumpy:
+        found.append(_with_bumps(*longer, space, options, target))
+    if not found or (more > bumpy / _ABOUT and tried):
+        found.append(_with_bumps(path, parts, space, options, target))
+    return min(found, key=lambda way: path_cost(way[0], target, tool))
+
+
+def path_cost(path: Points, target: MultiPolygon, tool: float) -> float:
+    """Its length, and for what it misses of ``target`` more than it would take to sweep that."""
+    missed = float(target.difference(swept_shape(path, tool)).area)
+    return path_length(path) + _DEAR * missed / tool
 
 
 def _with_bumps(

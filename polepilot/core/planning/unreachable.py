@@ -23,16 +23,17 @@ _MOST_REASONS = 25
 def unreachable_pieces(space: FreeSpace, reachable: MultiPolygon) -> tuple[Unreachable, ...]:
     """The floor that ``reachable`` leaves, piece by piece, the largest first; rings are split."""
     walls = space.lines.buffer(0.001) if not space.lines.is_empty else space.lines
-    rest = space.floor.difference(reachable.buffer(_SLIVER)).difference(walls)
+    rest = space.floor.difference(reachable.buffer(_SLIVER))
+    # On both sides of a thin wall there may be parts of a piece that is large enough only whole.
+    whole_ones = [part for part in polygons(rest) if part.area >= SMALLEST * 0.8]
+    large = shapely.union_all(
+        [part for part in whole_ones if _grown(part, space, reachable).area >= SMALLEST]
+    )
     pieces: list[tuple[Polygon, str]] = []
-    parts = [part for part in polygons(rest) if part.area >= SMALLEST * 0.8]
+    parts = [part for part in polygons(large.difference(walls)) if part.area >= SMALLEST / 5]
     passages = _Passages(space)
     for index, part in enumerate(sorted(parts, key=lambda p: -float(p.area))):
-        # Give back what was taken against slivers, but nothing of what is reachable.
-        grown = part.buffer(_SLIVER, join_style="mitre").intersection(space.floor)
-        whole = max(polygons(grown.difference(reachable)) or [part], key=lambda p: float(p.area))
-        if whole.area < SMALLEST:
-            continue
+        whole = _grown(part, space, reachable)
         if index < _MOST_REASONS:
             reason = passages.reason(whole)
         else:
@@ -41,6 +42,12 @@ def unreachable_pieces(space: FreeSpace, reachable: MultiPolygon) -> tuple[Unrea
     return tuple(
         Unreachable(_ring(piece), reason) for piece, reason in pieces if piece.area >= SMALLEST / 5
     )
+
+
+def _grown(part: Polygon, space: FreeSpace, reachable: MultiPolygon) -> Polygon:
+    """A part with what was taken of it against slivers, but nothing of what is reachable."""
+    grown = part.buffer(_SLIVER, join_style="mitre").intersection(space.floor)
+    return max(polygons(grown.difference(reachable)) or [part], key=lambda p: float(p.area))
 
 
 class _Passages:

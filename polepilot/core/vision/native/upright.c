@@ -340,6 +340,8 @@ int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candida
     columns = columns > EYE_MOST_COLUMNS ? EYE_MOST_COLUMNS : columns;
     band bands[2 * EYE_MOST_BITS + 4];
     int n = fill_bands(p, task, c, code, segments, unit, first, step, columns, sharp, bands);
+    if (n < 2)
+        return EYE_NO_CONTRAST;
     know_lean(bands, n, bands[0].weight > 0 && bands[n - 1].weight > 0, wide, out);
     double across_first = first + (step - 1) / 2.0;
     cap_signal(bands, n, columns, (int)lround((c->column - across_first) / step));

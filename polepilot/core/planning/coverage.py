@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -30,7 +31,14 @@ from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.order import Run, ordered_runs
 from polepilot.core.planning.score import predict
 from polepilot.core.planning.sharp import Recorder, chained, path_cost, sharp_path
-from polepilot.core.planning.space import FreeSpace, as_multi, free_poles, free_space, polygons
+from polepilot.core.planning.space import (
+    FreeSpace,
+    as_multi,
+    free_poles,
+    free_space,
+    other_starts,
+    polygons,
+)
 from polepilot.core.planning.swept import few_corners, swept_shape
 from polepilot.core.planning.track import without_jerks
 from polepilot.core.planning.unreachable import unreachable_pieces
@@ -48,6 +56,8 @@ _CLOSER = (1.0, 0.0, 0.95, 0.9)
 """Spacings that are tried; see ``nested_loops``."""
 _SOON = (2000, 600)
 """With more corners than the first no other spacing is tried, up to the second all of them."""
+_FEW = 250
+"""Up to so many corners other starts are tried as well, where the site has none."""
 _TOUCH = 0.004
 """How much loops overlap where bumps sweep what is left between them."""
 _GAP = 0.55
@@ -127,29 +137,36 @@ def _shortest(
     best: tuple[Points, Gears, tuple[PlanPart, ...]] | None = None
     least = math.inf
     spacings = [_CLOSER[:2], *((closer,) for closer in _CLOSER[2:])] if plain else [_CLOSER]
-    for spacing in spacings:
-        strokes = _strokes(site, space, options, target, whole, spacing)
+    trials = [(space, spacing) for spacing in spacings]
+    free_start = options.start is None and site.start is None
+    while trials:
+        here, spacing = trials.pop(0)
+        strokes = _strokes(site, here, options, target, whole, spacing)
         if not strokes:
-            strokes = [_least_stroke(space)]
+            strokes = [_least_stroke(here)]
         report(0.3, "order")
         runs = ordered_runs(
             strokes,
-            space.start.position,
-            space,
+            here.start.position,
+            here,
             options.order,
             reach=options.tool_width,
             gap=0.0 if options.min_turn_radius > 0 else _GAP * options.tool_width,
         )
         report(0.5, "path")
-        found = _path(runs, space, options, target, notes if best is None else [])
+        found = _path(runs, here, options, target, notes if best is None else [])
         corners = len(few_corners(found[0]))
         if not plain or not whole or options.order == "paper" or corners > _SOON[0]:
             return best or found
         cost = path_cost(found[0], target, options.tool_width)
         if cost < least:
-            best, least = found, cost
+            best, least, best_spacing = found, cost, spacing
         if corners > _SOON[1]:
             break
+        if not trials and free_start and corners <= _FEW:
+            # Where the job may begin anywhere, it may be shorter from an end of the longest side.
+            trials = [(replace(space, start=start), best_spacing) for start in other_starts(space)]
+            free_start = False
     assert best is not None  # there is at least one spacing
     return best
 

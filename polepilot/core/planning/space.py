@@ -299,6 +299,14 @@ def _default_start(home: Polygon) -> geometry.Point:
     return (float(middle[0]), float(middle[1]))
 
 
+def other_starts(space: FreeSpace) -> list[Start]:
+    """Both ends of the longest side, as starts where the site has none."""
+    corners = np.asarray(space.polygon.exterior.coords, dtype=float)[:, :2]
+    sides = np.round(np.hypot(*np.diff(corners, axis=0).T), 6)
+    index = int(np.argmax(sides))
+    return [Start(float(x), float(y)) for x, y in corners[[index, index + 1]]]
+
+
 def _graph_of(tolerance: float, shape: shapely.Geometry) -> _Graph:
     """The corners of a shape at which its inside has more than half a turn."""
     nodes: list[NDArray[np.float64]] = [np.zeros((0, 2))]

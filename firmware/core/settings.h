@@ -46,6 +46,12 @@
 #if DUTY_SLEW < 1 || PAN_SLEW < 1
 #error "the slew limit of a duty is at least 1 per mille per millisecond"
 #endif
+#if STEERING_SLEW < 1
+#error "the slew limit of the servo is at least 1 centidegree per millisecond"
+#endif
+#if MAX_STEERING < 0 || MAX_STEERING > 9000
+#error "the servo turns by 9000 centidegrees at most"
+#endif
 
 struct settings {
     uint8_t board;             /* BOARD_... */

@@ -109,7 +109,7 @@ static void forget(void)
     int slave = open(device, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
 
     if (slave >= 0) {
-        (void)tcflush(slave, TCIOFLUSH);
+        (void)tcflush(slave, TCIFLUSH);
         (void)close(slave);
     }
 }

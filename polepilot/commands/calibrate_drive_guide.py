@@ -136,11 +136,13 @@ class Guide:
             duty = least
             while True:
                 self._want(f"May the {side} rear wheel turn forward for a moment ({duty // 10} %)?")
-                self._motion(
+                motion = self._motion(
                     lambda duty=duty, left=left, right=right: self._bench.drive(  # type: ignore[misc]
                         left * duty, right * duty, 0, _TWITCH
                     )
                 )
+                if motion is None:  # says nothing about the duty
+                    continue
                 seen = choice(
                     self._person,
                     f"Did the {side} wheel turn forward: yes, no (it stood), or other (o)?",

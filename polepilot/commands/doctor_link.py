@@ -10,7 +10,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from polepilot.core.errors import RefusedError
 from polepilot.core.link.messages import NO_SENSOR, Faults, Features, Telemetry
 from polepilot.core.link.report import LinkState
 from polepilot.core.link.words import BOARDS, STATES, faults_in_words, features_in_words
@@ -212,13 +211,7 @@ class LinkDoctor:
             self.note("stop by link", "bad", "the board does not acknowledge ESTOP")
             return
         self.bench.watch(0.1)
-        latched = self.stopped
-        try:
-            self.bench.arm()
-            armed = True
-        except RefusedError:
-            armed = False
-        if not latched or armed:
+        if not self.stopped:
             self.note("stop by link", "bad", "the board does not stay stopped after ESTOP")
             return
         released = self.bench.release()

@@ -263,6 +263,7 @@ def unplug(board: BoardProcess, rng: np.random.Generator, limit_ms: int = 250 + 
         bench.collect(float(rng.integers(1, 30)) / 1000)
     before, wait_ms = bench.time_ms(), int(rng.integers(0, 20))
     bench.collect(wait_ms / 1000)
+    assert board.outputs.left > 0
     last = Drive(1000, 1000, 0).to_packet(9).encode()
     port.send(last[: rng.integers(0, len(last) + 1)])
     standing = [m for m in bench.collect(0.6) if isinstance(m, Telemetry) and m.duty == (0, 0)]

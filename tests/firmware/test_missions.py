@@ -87,8 +87,8 @@ def compare(
 ) -> SimulationResult:
     """The same mission through both boards.
 
-    The C core turns the servo at a limited rate and waits before it reverses a motor, so that the
-    runs are not the same to the millimetre; their outcome is.
+    Packets reach the two at other moments, so that the runs are not the same to the millimetre;
+    their outcome is.
     """
     python = fly(site, plan, seed, folder, None, settings)
     through_c = fly(site, plan, seed, folder, board(), settings)

@@ -1,8 +1,8 @@
 /* PIC18F4550 at 48 MHz: the paper's microcontroller. README.md has its pins as a table.
  *
  * Low interrupts: the millisecond, the line, the pan motor. The high one has nothing but the servo's
- * two edges, which nothing may delay. A port is written by the main loop (D), the high interrupt (C)
- * or the low one (B) alone, so that no write undoes another. */
+ * two edges, which nothing may delay. Ports are changed by single bits, each in one instruction, so that
+ * no write undoes another. */
 #include "hal/pic18f4550/registers.h"
 
 #include "core/board.h"
@@ -182,7 +182,8 @@ LOW_INTERRUPT(on_rest)
         T3CON &= (uint8_t)~RUNNING;
         LATB &= (uint8_t)~PAN_ENABLE;
     }
-    if ((PIR1 & OF_TIMER2) != 0u) {
+    /* Not while the main loop writes a width of two bytes. */
+    if (((PIR1 & OF_TIMER2) != 0u) && ((PIE1 & OF_TIMER2) != 0u)) {
         PIR1 &= (uint8_t)~OF_TIMER2;
         on_millisecond();
     }
@@ -365,7 +366,8 @@ static uint8_t reset_faults(void)
         /* Power-up from nothing; the other bits mean nothing yet. */
     } else if ((RCON & 0x01u) == 0u) {
         faults = FAULT_BROWN_OUT_RESET;
-    } else if (((RCON & 0x08u) == 0u) || ((STKPTR & 0xC0u) != 0u)) {
+    } else if (((RCON & 0x08u) == 0u) || ((RCON & 0x10u) == 0u) || ((STKPTR & 0xC0u) != 0u)) {
+        /* The watchdog, a reset that the program has called, or its stack. */
         faults = FAULT_WATCHDOG_RESET;
     } else {
         /* the reset pin */

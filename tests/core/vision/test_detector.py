@@ -225,6 +225,25 @@ def test_how_much_of_a_landmark_has_to_be_in_the_picture(number: int) -> None:
         assert seen(above, below) == [], (above, below)
 
 
+@pytest.mark.parametrize("number", [3, 16 + 5, 16 + 15, 128 + 9])
+def test_a_longer_code_cut_short_is_no_shorter_one(number: int) -> None:
+    """Its lower end stands on the floor; its upper one, at the picture's edge, is any segment."""
+    bits = 8 if number > 31 else 5
+    longer = LandmarkKind(bits=bits)
+    kinds = dict.fromkeys(range(1, 16), LandmarkKind()) | {number: longer}
+    detector = LandmarkDetector(CAMERA, kinds)
+    image = picture([pole(number, 3.0, 0.0, longer)])
+    (whole,) = detector.detect(image)
+    assert whole.id == number
+    unit = (whole.bottom - whole.top) / longer.segments
+    for gone in np.arange(0.5, 2 * bits, 0.25):
+        first = round(whole.top + gone * unit)
+        left = replace(CAMERA, height=300 - first, center_y=CAMERA.center_y - first)
+        looking = LandmarkDetector(left, kinds)
+        found = looking.detect(np.ascontiguousarray(image[first:]))
+        assert {one.id for one in found} <= {number}, gone
+
+
 def test_a_landmark_without_an_end_bar_stands_on_the_floor() -> None:
     image = picture([pole(13, 3.0, 0.0)])
     one = only(image)

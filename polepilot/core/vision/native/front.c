@@ -1,9 +1,9 @@
-/* What speaks for something in front of a bit that reads dark.
+/* What speaks for something in front of a bit, whether it reads dark or bright.
  *
  * A landmark's dark segments are painted with one black, and its sides are straight. What covers a
- * bit has another black, or ends amid the dark rows, or shows beside the pole at just these rows,
- * with the very light that the bit has. Each of that alone happens without a cover, if rarely, so
- * they are added up; only what is seen at both sides of the pole is enough by itself. */
+ * bit has another black (or other paint, where it is bright), or ends amid the dark rows, or shows
+ * beside the pole at just these rows, with the very light that the bit has. Each of that alone
+ * happens without a cover, if rarely, so they are added up; only what is seen at both sides of the pole is enough by itself. */
 #include "internal.h"
 
 #include <math.h>
@@ -250,7 +250,7 @@ static void know_sides(scene *s, const eye_task *task)
     }
 }
 
-/* Whether the sides stand out where the bit is, and at no bright segment: evidence. */
+/* Whether the sides stand out where the bit is, and nowhere else: evidence. */
 static double swells(const scene *s, int i, int from, int to)
 {
     double both = 0;
@@ -311,7 +311,7 @@ static double step(const scene *s, const eye_upright *u, int from, int to)
     return room > 0 ? at_most(most / (STEP * room + STEP_SPREAD * s->usual)) : 0;
 }
 
-/* Whether something stands in front of a bit that reads dark. */
+/* Whether something stands in front of a bit. */
 int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *u,
                  const eye_scale *scale, const eye_side *side, const char *code,
                  double levels[][EYE_LIGHTS], int segments)

@@ -67,6 +67,7 @@ int eye_straighten(const eye_picture *picture, const eye_task *task,
 /* Whether the colour of what a candidate covers is blurred along it, and its brightness is not. */
 int eye_has_blurred_colour(const eye_picture *picture, const eye_task *task,
                            const eye_candidate *candidate);
+/* ``sharp``, here and below: by brightness instead of the paint's colour. */
 int eye_fit_scale(const eye_upright *upright, const eye_task *task, const char *code,
                   const eye_candidate *candidate, int sharp, eye_scale *out);
 void eye_refine_scale(const eye_upright *upright, const eye_task *task, const char *code,

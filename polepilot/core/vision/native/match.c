@@ -65,6 +65,10 @@ static int match_bars(eye_hits *hits, const eye_run *upper, const eye_run *lower
     float above = upper->end - upper->start, below = lower->end - lower->start;
     int cut_above = upper->start <= 0.0f;
     int cut_below = lower->end >= (float)(hits->picture->rows - 1);
+    /* Of a longer code a bit or a fence may lie at the picture's edge, where this one has a bar. */
+    float least = bits < hits->bits[hits->n_bits - 1] ? CUT_BAR * unit : 0;
+    if ((cut_above && above < least) || (cut_below && below < least))
+        return 0;
     int id = read_runs(upper, (int)(lower - upper) - 1, bits, upper->end, unit, slack);
     int contrast = id ? contrast_of(upper, lower) : 0;
     if (contrast == 0 || hits->n_hits >= EYE_MOST_HITS)

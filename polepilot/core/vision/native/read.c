@@ -76,7 +76,10 @@ int eye_read(const eye_task *task, double levels[][EYE_LIGHTS], int segments, in
     code[segments] = '\0';
     *tint = 0;
     if (channels == 3 && task->low >= 0) {
-        *tint = (mean[task->low] - dark[task->low]) / (mean[task->high] - dark[task->high]);
+        double lead = mean[task->high] - dark[task->high];
+        if (!(lead > 0)) /* what is judged by its brightness may lack it */
+            return EYE_WRONG_COLOUR;
+        *tint = (mean[task->low] - dark[task->low]) / lead;
         double high = mean[task->high], low = mean[task->low];
         int other = 3 - task->high - task->low;
         /* Where the brightest channel has reached the end of its scale the next one catches up. */

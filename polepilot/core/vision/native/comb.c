@@ -19,7 +19,7 @@
 #define FRAYED 11          /* rows by which a code may be shorter than its stretch of colour, */
 #define HIDDEN 2           /* and by which it may be longer */
 #define ROWS_APART 3       /* every third row is asked for faint colour */
-#define LEAST_DEPTH 8.0f   /* grey levels of a valley */
+#define LEAST_DEPTH 9.0f   /* grey levels of a valley */
 #define MOST_SUMS (3 * LONGEST + 32)
 
 /* The running sum of the brightness of three columns, grey levels of one. What is beside them is in

@@ -29,6 +29,7 @@
 #define OTHER_BLACK 0.04   /* of bright - dark, and times the spread of the other dark segments: */
 #define OTHER_SPREAD 3.0
 #define OTHER_PAINT 0.25   /* of bright - dark; gloss and shade differ by less */
+#define LIKE_PAINT 0.4     /* evidence of that below which it is the bars' paint */
 #define SWELLS 0.45        /* columns by which a side stands out, and times as much elsewhere: */
 #define SWELLS_SPREAD 3.0
 #define BACKGROUND 0.25 /* of bright - dark: least light behind against which a side shows */
@@ -350,7 +351,10 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
         int from = i, to = i + 1;
         double evidence = 0;
         if (code[i] == '1') {
-            evidence = goes_on(&s, i, from, to) + other_paint(&s, i);
+            evidence = other_paint(&s, i);
+            if (evidence < LIKE_PAINT)
+                continue;
+            evidence += goes_on(&s, i, from, to);
         } else {
             while (code[from - 1] == '0')
                 from--;

@@ -7,33 +7,37 @@ comes back a little farther on. Corners are as sharp as they come: for radius 0 
 
 from __future__ import annotations
 
+import itertools
 import math
+from bisect import bisect_left
 from collections.abc import Iterable
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import LineString, MultiPolygon, Polygon
+from shapely import LineString, Polygon
 
 from polepilot.core.plan import PlanPart
-from polepilot.core.planning.patches import pieces_of, standing_place, strip_of
-from polepilot.core.planning.space import FreeSpace, polygons
+from polepilot.core.planning.patches import patches_of, pieces_of, standing_place, strip_of
+from polepilot.core.planning.space import FreeSpace
 from polepilot.core.planning.swept import few_corners, swept_pieces
+from polepilot.core.planning.target import CHORD, Target
 
 Points = NDArray[np.float64]
 Shapes = NDArray[np.object_]
 
-_SLIVER = 0.002
-"""What is thinner than twice this is left, metres."""
 _LOSS = 0.0003
 """So much may be swept no more where a bump cuts across, m² for a tool of 0.4 m."""
 _PITCH = 1.7
 """A path beside a strip steps aside for half of this, as a share of the tool's radius."""
 _RISE = 0.9
 """From how far away such steps sweep the whole strip, as a share of the tool's radius."""
-_ROUND = 12
+_ROUND = 8
 """Segments per quarter turn of a capsule."""
+_FAR = 8.0
+"""Bumps farther from each other than this, in the tool's radii, do not know of each other."""
 _MOST_CUTS = 7
 """How often a patch is halved until one place sweeps each piece."""
 
@@ -58,56 +62,73 @@ def short_bumps(patch: Polygon, tool: float) -> bool:
 def with_bumps(
     path: Points,
     parts: tuple[PlanPart, ...],
-    target: MultiPolygon,
-    missed: shapely.Geometry,
+    target: Target,
     space: FreeSpace,
-    tool: float,
     smallest: float,
     enough: float = 0.0,
     whole_parts: bool = False,
 ) -> tuple[Points, tuple[PlanPart, ...]]:
-    """The path with bumps to those patches of ``missed`` that are larger than ``smallest`` m².
+    """The path with bumps to those patches that it misses and that are larger than ``smallest`` m².
 
     ``enough``: the smallest ones are left if all of them together make up no more, m².
     ``whole_parts``: the ends of parts stay where they are.
     """
-    opened = missed.buffer(-_SLIVER, quad_segs=2).buffer(_SLIVER, quad_segs=2)
-    patches = [patch for patch in polygons(opened) if patch.area >= smallest]
-    left = sum(float(patch.area) for patch in patches)
-    if left <= enough:
-        return path, parts
-    bumped = _Bumped(path, target, space, tool)
-    if whole_parts:
-        bumped.keep([part.last for part in parts])
-    for patch in sorted(patches, key=lambda p: (-float(p.area), p.bounds)):
+    patches = patches_of(target.missed(path), smallest)
+    for _ in range(2):  # the second time for what bumps themselves have missed
+        left = sum(float(patch.area) for patch in patches)
         if left <= enough:
             break
-        bumped.reach(patch, _MOST_CUTS)
-        left -= float(patch.area)
-    return bumped.result(parts)
+        bumped = _Bumped(path, target, space)
+        if whole_parts:
+            bumped.keep([part.last for part in parts])
+        for patch in sorted(patches, key=lambda p: (-float(p.area), p.bounds)):
+            if left <= enough:
+                break
+            bumped.reach(patch, _MOST_CUTS)
+            left -= float(patch.area)
+        path, parts = bumped.result(parts)
+        patches = bumped.left(patches, smallest)
+    return path, parts
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Bump:
+    """A stretch of the path that is replaced."""
+
+    first: float
+    """From this length along the path to ``last``, metres."""
+    last: float
+    tips: Points
+    """The places between."""
+    line: LineString
+    """Through all of them."""
+    swept: shapely.Geometry
 
 
 class _Bumped:
     """A path while bumps are put into it."""
 
-    def __init__(self, path: Points, target: MultiPolygon, space: FreeSpace, tool: float) -> None:
+    def __init__(self, path: Points, target: Target, space: FreeSpace) -> None:
         self._path = path
         self._target = target
         self._space = space
-        self._radius = tool / 2
+        self._radius = target.tool / 2
         self._marks = np.r_[0.0, np.cumsum(np.hypot(*np.diff(path, axis=0).T))]
         self._lines = shapely.linestrings(np.stack([path[:-1], path[1:]], axis=1))
         self._tree = shapely.STRtree(self._lines)
         self._kept_marks = np.zeros(0)
         # For what it sweeps the path is taken with fewer chords.
-        few = few_corners(path) if len(path) > 2 else np.arange(len(path))
+        few = few_corners(path, CHORD) if len(path) > 2 else np.arange(len(path))
         self._few, self._few_marks = path[few], self._marks[few]
         pairs = np.stack([self._few[:-1], self._few[1:]], axis=1)
         self._few_tree = shapely.STRtree(shapely.linestrings(pairs))
         self._pieces = swept_pieces(self._few, self._radius, _ROUND)
-        self._bumps: list[tuple[float, float, Points, LineString, shapely.Geometry]] = []
-        """From and to which length along the path, the places between, the line through them,
-        what is swept along it."""
+        self._bumps: list[_Bump] = []
+        self._begins: list[float] = []
+        """Where they begin, in order, as lengths along the path; and the same where they end."""
+        self._ends: list[float] = []
+        self._around: dict[tuple[int, int], list[_Bump]] = {}
+        """Those that may be near to a square of the floor."""
 
     def keep(self, indices: list[int]) -> None:
         """Bumps may not cut across these points of the path."""
@@ -123,6 +144,13 @@ class _Bumped:
             for piece in strip or pieces_of(patch, self._radius):
                 if not (strip and self._step_aside(piece)):
                     self.reach(piece, cuts - 1)
+
+    def left(self, patches: list[Polygon], smallest: float) -> list[Polygon]:
+        """What bumps leave of some patches, each at least ``smallest`` m²."""
+        swept = np.array([bump.swept for bump in self._bumps], dtype=object)
+        tree = shapely.STRtree(swept)
+        rest = [patch.difference(shapely.union_all(swept[tree.query(patch)])) for patch in patches]
+        return [part for piece in rest for part in patches_of(piece, smallest)]
 
     def _step_aside(self, piece: Polygon) -> bool:
         """Leads a stretch of a straight leg nearer to a piece of a strip beside it."""
@@ -158,25 +186,47 @@ class _Bumped:
 
     def _taken(self, first: float, last: float) -> bool:
         """Whether a stretch of the path holds another bump, or a point that stays."""
-        return any(first < bump[1] and bump[0] < last for bump in self._bumps) or bool(
-            ((self._kept_marks > first) & (self._kept_marks < last)).any()
-        )
+        index = bisect_left(self._begins, last)  # bumps do not overlap each other
+        if index and self._ends[index - 1] > first:
+            return True
+        return bool(((self._kept_marks > first) & (self._kept_marks < last)).any())
+
+    def _near(self, x: float, y: float) -> list[_Bump]:
+        """The bumps whose first tip is not far from a place."""
+        return self._around.get(self._square(x, y), [])
+
+    def _square(self, x: float, y: float) -> tuple[int, int]:
+        side = _FAR * self._radius
+        return math.floor(x / side), math.floor(y / side)
+
+    def _put(self, bump: _Bump) -> None:
+        self._bumps.append(bump)
+        at = bisect_left(self._begins, bump.first)
+        self._begins.insert(at, bump.first)
+        self._ends.insert(at, bump.last)
+        column, row = self._square(*bump.tips[0].tolist())
+        for square in itertools.product(range(column - 1, column + 2), range(row - 1, row + 2)):
+            self._around.setdefault(square, []).append(bump)
 
     def _add(self, place: shapely.Geometry) -> None:
         """Puts in a bump that touches ``place``, where that costs least."""
-        if (
-            self._bumps
-            and shapely.distance(np.array([b[3] for b in self._bumps]), place).min() == 0
-        ):
+        x0, y0, x1, y1 = shapely.bounds(place).tolist()
+        others = [bump.line for bump in self._near((x0 + x1) / 2, (y0 + y1) / 2)]
+        if others and shapely.intersects(np.array(others), place).any():
             return  # an earlier bump does that
-        near = self._tree.query(place, predicate="dwithin", distance=4 * self._radius)
-        lengths = np.round(shapely.distance(self._lines[near], place), 6)
-        for index in near[np.lexsort((near, lengths))].tolist():
-            line = shapely.shortest_line(self._lines[index], place)
-            if self._space.holds(line):
+        for reach in (1.0, 4.0):
+            near = self._tree.query(place, predicate="dwithin", distance=reach * self._radius)
+            lengths = np.round(shapely.distance(self._lines[near], place), 6)
+            lines = (
+                (index, shapely.shortest_line(self._lines[index], place))
+                for index in near[np.lexsort((near, lengths))].tolist()
+            )
+            free = next(((index, line) for index, line in lines if self._space.holds(line)), None)
+            if free is not None:
                 break
         else:
             return
+        index, line = free
         foot, tip = shapely.get_coordinates(line)
         if math.dist(foot, tip) < 1e-6:
             return
@@ -199,7 +249,7 @@ class _Bumped:
         most = losses * _LOSS * (self._radius / 0.2) ** 2
         if last - first > 1e-9 and self._loses(new, first, last, most):
             return False
-        self._bumps.append((first, last, tips, LineString(new), self._swept(new)))
+        self._put(_Bump(first, last, tips, LineString(new), self._swept(new)))
         return True
 
     def _loses(self, new: Points, first: float, last: float, most: float) -> bool:
@@ -210,28 +260,31 @@ class _Bumped:
         lost = shapely.union_all(self._capsules(pairwise(old)))
         for capsule in self._capsules(pairwise(new)):
             lost = lost.difference(capsule)
-        lost = lost.intersection(self._target)
         if lost.area <= most:
             return False
-        mine = [bump for bump in self._bumps if math.dist(bump[2][0], new[1]) < 8 * self._radius]
-        gone = [(first, last), *((bump[0], bump[1]) for bump in mine)]
-        around = [bump[4] for bump in mine]
+        mine = self._near(*new[1].tolist())
+        gone = [(first, last), *((bump.first, bump.last) for bump in mine)]
         near = self._few_tree.query(lost, predicate="dwithin", distance=self._radius)
-        rest: list[Points] = []
-        for index in near.tolist():
-            a, b = float(self._few_marks[index]), float(self._few_marks[index + 1])
-            if any(start < b and a < end for start, end in gone):
-                rest += self._kept(index, gone)
-            else:
-                around.append(self._pieces[index])
-        if rest:
-            around += list(self._capsules(rest))
-        for shape in around:
-            if shapely.intersects(lost, shape):
-                lost = lost.difference(shape)
-                if lost.area <= most:
-                    return False
-        return True
+        begins, ends = self._few_marks[near], self._few_marks[near + 1]
+        cut = np.zeros(len(near), dtype=bool)
+        for start, end in gone:
+            cut |= (begins < end) & (start < ends)
+        rest = [part for index in near[cut].tolist() for part in self._kept(index, gone)]
+        around = np.concatenate(
+            [
+                np.array([bump.swept for bump in mine], dtype=object),
+                self._pieces[near[~cut]],
+                self._capsules(rest) if rest else np.zeros(0, dtype=object),
+            ]
+        )
+        shapely.prepare(lost)
+        around = around[shapely.intersects(lost, around)]
+        low, high = np.hsplit(shapely.bounds(around) - np.tile(lost.centroid.coords[0], 2), 2)
+        for index in np.argsort(np.hypot(*(low + high).T)).tolist():
+            lost = lost.difference(around[index])
+            if lost.area <= most:
+                return False
+        return self._target.area_in(lost) > most
 
     def _capsules(self, lines: Iterable[tuple[Points, Points] | Points]) -> Shapes:
         """What is swept along straight lines, each on its own."""
@@ -272,7 +325,8 @@ class _Bumped:
         points: list[Points] = []
         marks: list[float] = []
         at = 0
-        for first, last, tips, *_ in sorted(self._bumps, key=lambda bump: (bump[0], bump[1])):
+        for bump in sorted(self._bumps, key=lambda bump: (bump.first, bump.last)):
+            first, last, tips = bump.first, bump.last, bump.tips
             stop = int(np.searchsorted(self._marks, first - 1e-9))
             points += list(self._path[at:stop])
             marks += self._marks[at:stop].tolist()

@@ -29,6 +29,7 @@ from polepilot.core.planning.offset import (
 )
 from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.order import Run, ordered_runs
+from polepilot.core.planning.patches import patches_of
 from polepilot.core.planning.score import predict
 from polepilot.core.planning.sharp import Recorder, chained, path_cost, sharp_path
 from polepilot.core.planning.space import (
@@ -37,9 +38,9 @@ from polepilot.core.planning.space import (
     free_poles,
     free_space,
     other_starts,
-    polygons,
 )
 from polepilot.core.planning.swept import few_corners, swept_shape
+from polepilot.core.planning.target import Target
 from polepilot.core.planning.track import without_jerks
 from polepilot.core.planning.unreachable import unreachable_pieces
 from polepilot.core.planning.visits import with_visits
@@ -67,6 +68,10 @@ _LEAST = 0.0065
 _ENOUGH = 0.0003
 """Where less than this share of all is missed, no further patch is visited."""
 _MANY = 60
+_LARGE = 5000.0
+"""Up to so many squares of the tool the coverage is predicted more exactly."""
+_EXACT = 0.0002
+"""How exactly the coverage is predicted, in metres along the edge of what is swept."""
 _SMALLEST = 0.008
 """Missed patches below this are left, m² for a tool of 0.4 m; scaled with its square."""
 
@@ -96,16 +101,22 @@ def plan_scan(
             f"the reachable area of {reachable.area:.0f} m² is too large for a tool of "
             f"{in_words(options.tool_width)}: expected a path of at most {LONGEST / 1000:.0f} km."
         )
-    target = reachable if area is None else as_multi(reachable.intersection(area.buffer(0)))
-    if target.area < 1e-4:
+    wanted = reachable if area is None else as_multi(reachable.intersection(area.buffer(0)))
+    if wanted.area < 1e-4:
         raise PlanError("nothing of the area to scan can be reached from the start.")
+    target = Target(wanted, options.tool_width)
     report(0.1, "loops")
     notes = [*site.repairs, *space.notes]
     path, gear, parts = _shortest(site, space, options, target, area is None, notes, report)
     report(0.8, "unreachable parts")
     pieces = unreachable_pieces(space, reachable)
     report(0.9, "prediction")
-    predicted = predict(path, gear, target, options)
+    if wanted.area < _LARGE * options.tool_width**2:
+        target = Target(wanted, options.tool_width, _EXACT)
+    left = target.missed_area(path)
+    # All that a path sweeps is reachable; with patches it sweeps other floor as well.
+    swept = target.area - left if area is None else swept_shape(path, options.tool_width).area
+    predicted = predict(path, gear, options, 1.0 - left / target.area, swept)
     report(1.0, "done")
     return Plan(
         mode="scan",
@@ -117,7 +128,7 @@ def plan_scan(
         tool_width=options.tool_width,
         clearance=options.clearance,
         min_turn_radius=options.min_turn_radius,
-        area=target,
+        area=wanted,
         notes=tuple(notes),
         runtime=time.perf_counter() - began,
     )
@@ -127,7 +138,7 @@ def _shortest(
     site: Site,
     space: FreeSpace,
     options: PlanOptions,
-    target: MultiPolygon,
+    target: Target,
     whole: bool,
     notes: list[str],
     report: Progress,
@@ -158,7 +169,7 @@ def _shortest(
         corners = len(few_corners(found[0]))
         if not plain or not whole or options.order == "paper" or corners > _SOON[0]:
             return best or found
-        cost = path_cost(found[0], target, options.tool_width)
+        cost = path_cost(found[0], target)
         if cost < least:
             best, least, best_spacing = found, cost, spacing
         if corners > _SOON[1]:
@@ -196,7 +207,7 @@ def _strokes(
     site: Site,
     space: FreeSpace,
     options: PlanOptions,
-    target: MultiPolygon,
+    target: Target,
     whole: bool,
     spacings: tuple[float, ...],
 ) -> list[Stroke]:
@@ -210,8 +221,8 @@ def _strokes(
         pieces = [space.polygon]
         tolerance = min(0.002, 0.01 * tool)
     if not whole:
-        loops = _patch_strokes(pieces, target, tool, tolerance)
-        return _completed(loops, space, target, tool, smallest)
+        loops = _patch_strokes(pieces, target.shape, tool, tolerance)
+        return _completed(loops, space, target, smallest)
     if options.order == "paper":
         pieces = [region for piece in pieces for region in regions_of(piece, tool)]
     best: list[Stroke] = []
@@ -219,7 +230,7 @@ def _strokes(
     plain = options.min_turn_radius <= 0
     for closer in spacings:
         loops = nested_loops(pieces, tool, tolerance, closer, _TOUCH if plain else OVERLAP)
-        strokes = _completed(loops, space, target, tool, smallest, bumps=plain)
+        strokes = _completed(loops, space, target, smallest, bumps=plain)
         # Each clean-up pass has to be gone to and left again.
         extra = 2 * tool * (1 + (options.min_turn_radius > 0))
         cost = sum(s.line.length + (0.0 if s.closed else extra) for s in strokes)
@@ -233,8 +244,7 @@ def _strokes(
 def _completed(
     loops: list[Stroke],
     space: FreeSpace,
-    target: MultiPolygon,
-    tool: float,
+    target: Target,
     smallest: float,
     bumps: bool = False,
 ) -> list[Stroke]:
@@ -242,24 +252,20 @@ def _completed(
 
     ``bumps``: without those patches to which bumps of the path will be shorter.
     """
-    strokes = list(loops)
+    strokes, tool = list(loops), target.tool
     for _ in range(2):
-        missed = target
+        missed: shapely.Geometry = target.shape
         if strokes:
-            lines = [np.vstack([s.points, s.points[:1]]) if s.closed else s.points for s in strokes]
-            shapes = [swept_shape(line, tool) for line in lines]
-            missed = target.difference(shapely.union_all(shapes))
+            missed = target.missed(*(stroke.track for stroke in strokes))
             if bumps:
-                opened = missed.buffer(-0.002, quad_segs=2).buffer(0.002, quad_segs=2)
-                missed = as_multi(
-                    MultiPolygon([p for p in polygons(opened) if not short_bumps(p, tool)])
-                )
+                patches = patches_of(missed, smallest)
+                missed = MultiPolygon([p for p in patches if not short_bumps(p, tool)])
         more = cleanup_strokes(missed, tool, space, smallest)
         strokes += more
         if not more:
             break
     if not strokes:
-        strokes = cleanup_strokes(target, tool, space, 0.0)
+        strokes = cleanup_strokes(target.shape, tool, space, 0.0)
     return strokes
 
 
@@ -286,7 +292,7 @@ def _path(
     runs: list[Run],
     space: FreeSpace,
     options: PlanOptions,
-    target: MultiPolygon,
+    target: Target,
     notes: list[str],
 ) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
     if options.min_turn_radius <= 0:
@@ -299,7 +305,7 @@ def _driven_path(
     runs: list[Run],
     space: FreeSpace,
     options: PlanOptions,
-    target: MultiPolygon,
+    target: Target,
     notes: list[str],
 ) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
     """Followable by a steered wheel; what its curves miss is visited at the end."""
@@ -311,7 +317,7 @@ def _driven_path(
         record = Recorder()
         _drive(trial, runs, record, options)
         path, _ = trial.track.arrays()
-        left = target.difference(swept_shape(path, options.tool_width)).area
+        left = target.missed_area(path)
         if left < least:
             driver, recorder, least = trial, record, left
         if left < 0.1 * target.area:
@@ -319,7 +325,7 @@ def _driven_path(
     assert driver is not None  # there is at least one heading
     for _ in range(2):
         path, _ = driver.track.arrays()
-        missed = target.difference(swept_shape(path, options.tool_width))
+        missed = target.missed(path)
         smallest = _SMALLEST * (options.tool_width / 0.4) ** 2
         more = cleanup_strokes(missed, options.tool_width, space, smallest)
         if not more:
@@ -335,14 +341,13 @@ def _driven_path(
                 path,
                 gear,
                 parts,
-                target.difference(swept_shape(path, tool)),
+                target,
                 space,
-                tool,
                 driver.track.radius,
                 _LEAST * tool**2,
                 _ENOUGH * target.area,
             )
-    left = target.difference(swept_shape(path, options.tool_width)).area
+    left = target.missed_area(path)
     if left > 0.02 * target.area:
         notes.append(
             f"{left:.2f} m² cannot be swept with a turning radius of "

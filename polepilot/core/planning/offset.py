@@ -11,6 +11,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely import LineString, Polygon
 
+from polepilot.core.planning.patches import patches_of
 from polepilot.core.planning.space import MARGIN, FreeSpace, polygons, quadrant
 from polepilot.core.site import Site
 
@@ -23,6 +24,8 @@ _MOST_CUTS = 8
 _COARSE = 0.0005
 """How far an outermost loop of many corners is taken inside to have fewer, m."""
 _FINE = 0.005
+_SLIVER = 0.004
+"""What is thinner than twice this gets no pass, m."""
 _THIN = 0.1
 """A piece thinner than this share of the tool width is driven once, not around."""
 
@@ -40,9 +43,13 @@ class Stroke:
     """0 for the outermost loops, -1 for clean-up passes."""
 
     @property
+    def track(self) -> Points:
+        """The points as they are driven: of a loop, the first again at the end."""
+        return np.vstack([self.points, self.points[:1]]) if self.closed else self.points
+
+    @property
     def line(self) -> LineString:
-        points = np.vstack([self.points, self.points[:1]]) if self.closed else self.points
-        return LineString(points)
+        return LineString(self.track)
 
 
 def sharp_space(site: Site, space: FreeSpace, poles: list[tuple[float, float]]) -> list[Polygon]:
@@ -140,9 +147,8 @@ def cleanup_strokes(
     missed: shapely.Geometry, tool_width: float, space: FreeSpace, smallest: float
 ) -> list[Stroke]:
     """Passes along the patches of ``missed`` that are larger than ``smallest`` m²."""
-    opened = missed.buffer(-0.004, quad_segs=2).buffer(0.004, quad_segs=2)
     strokes: list[Stroke] = []
-    pending = [(patch, _MOST_CUTS) for patch in polygons(opened) if patch.area >= smallest]
+    pending = [(patch, _MOST_CUTS) for patch in patches_of(missed, smallest, _SLIVER)]
     while pending:
         patch, cuts = pending.pop()
         box = shapely.minimum_rotated_rectangle(patch)

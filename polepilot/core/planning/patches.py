@@ -13,10 +13,20 @@ from polepilot.core.planning.space import FreeSpace, polygons
 
 Points = NDArray[np.float64]
 
+SLIVER = 0.002
+"""What is thinner than twice this is left, metres."""
 _TIP = 0.03
 """Of a patch so much, as a share of the tool's radius, may be left along its outline."""
 _ROUND = 12
 """Segments per quarter turn of a disc."""
+
+
+def patches_of(missed: shapely.Geometry, smallest: float, sliver: float = SLIVER) -> list[Polygon]:
+    """Its parts of at least ``smallest`` m², without what is thinner than twice ``sliver``."""
+    large = [part for part in polygons(missed) if part.area >= smallest]
+    thick = shapely.buffer(large, -sliver, quad_segs=2)
+    opened = shapely.buffer(thick, sliver, quad_segs=2)
+    return [part for part in polygons(opened) if part.area >= smallest]
 
 
 def standing_place(patch: Polygon, space: FreeSpace, radius: float) -> shapely.Geometry | None:

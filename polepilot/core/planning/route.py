@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import LineString, MultiPolygon, Polygon
+from shapely import LineString, Polygon
 
 from polepilot.core.errors import PlanError
 from polepilot.core.geometry import Point, Pose2D
@@ -83,7 +83,7 @@ def plan_route(
         gear=gear,
         parts=(PlanPart("route", 0, len(path) - 1),),
         unreachable=unreachable_pieces(space, space.reachable()),
-        predicted=predict(path, gear, MultiPolygon(), options),
+        predicted=predict(path, gear, options),
         tool_width=options.tool_width,
         clearance=options.clearance,
         min_turn_radius=options.min_turn_radius,

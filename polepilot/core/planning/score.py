@@ -5,13 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
-from shapely import MultiPolygon
 
 from polepilot.core.plan import Prediction
 from polepilot.core.planning.options import PlanOptions
-from polepilot.core.planning.swept import swept_shape
 
 _SIDEWAYS = 0.25
 """Sideways acceleration that a plan counts on in curves, m/s²."""
@@ -20,22 +17,18 @@ _SIDEWAYS = 0.25
 def predict(
     path: NDArray[np.float64],
     gear: NDArray[np.int8],
-    area: MultiPolygon,
     options: PlanOptions,
-    swept: shapely.Geometry | None = None,
+    coverage: float = 1.0,
+    swept: float | None = None,
 ) -> Prediction:
-    """Coverage of ``area`` (1 where there is none), metres, seconds, changes of gear, overlap."""
+    """Metres, seconds, changes of gear; overlap where it is known how many m² are ``swept``."""
     steps = np.hypot(*np.diff(path, axis=0).T)
-    coverage, overlap = 1.0, 0.0
-    if not area.is_empty:
-        tool = options.tool_width
-        if swept is None:
-            swept = swept_shape(path, tool)
-        coverage = float(min(1.0, shapely.intersection(area, swept).area / area.area))
+    tool, overlap = options.tool_width, 0.0
+    if swept is not None:
         strip = steps.sum() * tool + math.pi * tool**2 / 4
-        overlap = float(max(0.0, 1.0 - swept.area / strip))
+        overlap = float(max(0.0, 1.0 - swept / strip))
     return Prediction(
-        coverage=coverage,
+        coverage=min(1.0, coverage),
         length=float(steps.sum()),
         duration=_duration(path, gear, steps, options),
         reversals=int(np.count_nonzero(np.diff(gear))),

@@ -8,15 +8,17 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-from shapely import MultiPolygon
+from shapely import Polygon
 
 from polepilot.core.plan import PartKind, PlanPart
 from polepilot.core.planning.bumps import bumps_length, with_bumps
 from polepilot.core.planning.offset import Points, Stroke, cleanup_strokes
 from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.order import Run
-from polepilot.core.planning.space import FreeSpace, polygons
-from polepilot.core.planning.swept import few_corners, swept_shape
+from polepilot.core.planning.patches import SLIVER, patches_of
+from polepilot.core.planning.space import FreeSpace
+from polepilot.core.planning.swept import few_corners
+from polepilot.core.planning.target import Target
 from polepilot.core.planning.trim import trimmed
 
 _LEAST = 0.0065
@@ -25,6 +27,8 @@ _SHARE = 0.00008
 """Nor those smaller than this share of all that is to be swept."""
 _TRIFLE = 0.0001
 """Where less than this share is missed by a path with sharp corners, it gets no further bump."""
+_LITTLE = 0.0005
+"""The same on large maps, where each bump is a smaller part of the whole."""
 _STRIP = 5.0
 """A missed patch longer than so many tool widths may be driven along at the end."""
 _ABOUT = 1.5
@@ -44,7 +48,7 @@ def sharp_path(
     runs: list[Run],
     space: FreeSpace,
     options: PlanOptions,
-    target: MultiPolygon,
+    target: Target,
     notes: list[str],
 ) -> tuple[Points, tuple[PlanPart, ...]]:
     """Corners as sharp as they come, all forward; with bumps to what is missed."""
@@ -52,40 +56,37 @@ def sharp_path(
     smallest = min(_LEAST * tool**2, _SHARE * target.area)
     path, parts = _joined_runs(runs, space, options, notes)
     if options.order != "paper":
-        ways = [trimmed(path, parts, target, tool, 3 * smallest)]
+        ways = [trimmed(path, parts, target, 3 * smallest)]
         if runs[-1].whole:
             # Its end may be swept already if the last loop is driven the other way round.
             turned = [*runs[:-1], replace(runs[-1], points=runs[-1].points[::-1].copy())]
-            ways.append(
-                trimmed(*_joined_runs(turned, space, options, []), target, tool, 3 * smallest)
-            )
+            ways.append(trimmed(*_joined_runs(turned, space, options, []), target, 3 * smallest))
         path, parts = min(ways, key=lambda way: path_length(way[0]))
     corners = len(few_corners(path))
     if options.order == "paper" or corners > _MOST_CORNERS:
         return _with_bumps(path, parts, space, options, target)
-    strip = _longest_strip(target.difference(swept_shape(path, tool)), tool)
+    strip = _longest_strip(target.missed(path), tool)
     if strip is None:
         return _with_bumps(path, parts, space, options, target)
     # The longest strip that loops leave is driven once, and nothing leads back from there.
     passes = cleanup_strokes(strip, tool, space, smallest)
     end = (float(path[-1, 0]), float(path[-1, 1]))
     longer = _joined_runs(chained(passes, end), space, options, [], path, parts)
-    longer = trimmed(*longer, target, tool, 3 * smallest)
+    longer = trimmed(*longer, target, 3 * smallest)
     more = path_length(longer[0]) - path_length(path)
-    bumpy = bumps_length(strip.geoms[0], tool)
+    bumpy = bumps_length(strip, tool)
     tried = corners <= _FEW_CORNERS and strip.length < _LONG * tool
     found = []
     if more < _ABOUT * bumpy:
         found.append(_with_bumps(*longer, space, options, target))
     if not found or (more > bumpy / _ABOUT and tried):
         found.append(_with_bumps(path, parts, space, options, target))
-    return min(found, key=lambda way: path_cost(way[0], target, tool))
+    return min(found, key=lambda way: path_cost(way[0], target))
 
 
-def path_cost(path: Points, target: MultiPolygon, tool: float) -> float:
+def path_cost(path: Points, target: Target) -> float:
     """Its length, and for what it misses of ``target`` more than it would take to sweep that."""
-    missed = float(target.difference(swept_shape(path, tool)).area)
-    return path_length(path) + _DEAR * missed / tool
+    return path_length(path) + _DEAR * target.missed_area(path) / target.tool
 
 
 def _with_bumps(
@@ -93,23 +94,18 @@ def _with_bumps(
     parts: tuple[PlanPart, ...],
     space: FreeSpace,
     options: PlanOptions,
-    target: MultiPolygon,
+    target: Target,
 ) -> tuple[Points, tuple[PlanPart, ...]]:
-    """The path with bumps to what it misses, and to what those miss."""
-    tool = options.tool_width
-    for _ in range(2):
-        path, parts = with_bumps(
-            path,
-            parts,
-            target,
-            target.difference(swept_shape(path, tool)),
-            space,
-            tool,
-            min(_LEAST * tool**2, _SHARE * target.area),
-            _TRIFLE * target.area,
-            options.order == "paper",
-        )
-    return path, parts
+    """The path with bumps to what it misses."""
+    return with_bumps(
+        path,
+        parts,
+        target,
+        space,
+        min(_LEAST * target.tool**2, _SHARE * target.area),
+        (_TRIFLE if len(few_corners(path)) < _MOST_CORNERS else _LITTLE) * target.area,
+        options.order == "paper",
+    )
 
 
 def chained(strokes: list[Stroke], here: tuple[float, float]) -> list[Run]:
@@ -140,13 +136,14 @@ def chained(strokes: list[Stroke], here: tuple[float, float]) -> list[Run]:
     ]
 
 
-def _longest_strip(missed: shapely.Geometry, tool: float) -> MultiPolygon | None:
+def _longest_strip(missed: shapely.Geometry, tool: float) -> Polygon | None:
     """The longest missed patch, if it is worth to be driven along."""
-    opened = missed.buffer(-0.004, quad_segs=2).buffer(0.004, quad_segs=2)
-    longest = max(polygons(opened), key=lambda patch: float(patch.length), default=None)
+    longest = max(
+        patches_of(missed, 0.0, 2 * SLIVER), key=lambda patch: float(patch.length), default=None
+    )
     if longest is None or longest.length / 2 < _STRIP * tool:
         return None
-    return MultiPolygon([longest])
+    return longest
 
 
 def path_length(path: Points) -> float:

@@ -17,6 +17,8 @@ _SHIFT = 6
 """Fractional bits of OpenCV's drawing coordinates."""
 _CHORD = 0.0003
 """How far the chords of a path's arcs may be from it, metres."""
+_CORNER = 0.3
+"""Where a path turns by more than this it has a corner, radians."""
 _MOST_CELLS = 30_000_000
 SMALLEST_PATCH = 0.01
 """A missed patch smaller than this is not worth a visit, m²."""
@@ -32,8 +34,7 @@ def swept_shape(
     """
     radius = tool_width / 2
     path = path[np.r_[True, np.hypot(*np.diff(path, axis=0).T) > 1e-9]]
-    if len(path) > 2:
-        path = path[few_corners(path)]
+    path = path[few_corners(path)]
     ends = shapely.buffer(shapely.points(path[[0, -1]]), radius, quad_segs=quad_segs)
     if len(path) < 2:
         return shapely.union_all(ends)
@@ -45,23 +46,48 @@ def swept_shape(
         return shapely.union_all(shapely.buffer(lines, radius, quad_segs=quad_segs))
 
 
-def few_corners(path: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Which points of a path stay so that its arcs are drawn with few chords."""
-    line = shapely.linestrings(np.column_stack([path, np.arange(len(path))]))
-    line = shapely.simplify(line, _CHORD, preserve_topology=False)
-    return np.asarray(np.round(shapely.get_coordinates(line, include_z=True)[:, 2]), np.intp)
+def few_corners(path: NDArray[np.float64], error: float = _CHORD) -> NDArray[np.intp]:
+    """Which points of a path stay so that its arcs are drawn with few chords, ``error`` metres
+    from it at most.
+
+    From one sharp corner to the next; so what is changed in one place changes nothing elsewhere.
+    """
+    if len(path) < 3:
+        return np.arange(len(path))
+    steps = np.diff(path, axis=0)
+    directions = np.arctan2(steps[:, 1], steps[:, 0])
+    turns = np.abs((np.diff(directions) + math.pi) % math.tau - math.pi)
+    bounds = np.r_[0, np.flatnonzero(turns > _CORNER) + 1, len(path) - 1]
+    sizes = np.diff(bounds) + 1
+    places = np.repeat(bounds[:-1] - np.cumsum(sizes) + sizes, sizes) + np.arange(sizes.sum())
+    stretches = np.repeat(np.arange(len(sizes)), sizes)
+    lines = shapely.linestrings(np.column_stack([path[places], places]), indices=stretches)
+    few = shapely.simplify(lines, error, preserve_topology=False)
+    return np.unique(np.round(shapely.get_coordinates(few, include_z=True)[:, 2]).astype(np.intp))
 
 
 def swept_pieces(
     path: NDArray[np.float64], radius: float, quad_segs: int = 16
 ) -> NDArray[np.object_]:
-    """What a disc sweeps along each segment but for the half discs at the path's two ends.
+    """What a disc sweeps along each segment but for the half discs at the path's two ends."""
+    after = np.vstack([path[2:], np.full((1, 2), np.nan)])[: len(path) - 1]
+    return swept_by(np.hstack([path[:-1], path[1:], after]), radius, quad_segs)
 
-    A polygon per segment: a rectangle, with the sector at the corner that follows.
+
+def swept_by(
+    segments: NDArray[np.float64], radius: float, quad_segs: int = 16
+) -> NDArray[np.object_]:
+    """What a disc sweeps along segments, without the half discs at their ends.
+
+    ``segments``: M x 6, from where, to where, and the point after that (NaN: none). A polygon each:
+    a rectangle, with the sector at the corner that follows.
     """
-    steps = np.diff(path, axis=0)
+    if not len(segments):
+        return np.zeros(0, dtype=object)
+    begins, ends = segments[:, :2], segments[:, 2:4]
+    steps, following = ends - begins, segments[:, 4:] - ends
     directions = np.arctan2(steps[:, 1], steps[:, 0])
-    turns: NDArray[np.float64] = np.append(np.diff(directions), 0.0)
+    turns = np.nan_to_num(np.arctan2(following[:, 1], following[:, 0]) - directions)
     turns = (turns + math.pi) % math.tau - math.pi
     turns = np.where(np.abs(turns) > 3.1, np.copysign(math.pi, turns), turns)
     side = np.where(turns < 0, -1.0, 1.0)  # the sector is on the other side
@@ -78,7 +104,7 @@ def swept_pieces(
     across = np.where(last, directions[rows] + math.pi / 2, across)
     out = np.where((place == 0) | last, 1.0, -1.0) * side[rows] * radius
     out[middle] = 0.0
-    coords = np.where((place < 2)[:, None], path[:-1][rows], path[1:][rows])
+    coords = np.where((place < 2)[:, None], begins[rows], ends[rows])
     coords = coords + out[:, None] * np.stack([np.cos(across), np.sin(across)], axis=1)
     return np.asarray(shapely.polygons(shapely.linearrings(coords, indices=rows)))
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import MultiPolygon
 
 from polepilot.core.plan import PlanPart
 from polepilot.core.planning.swept import few_corners, swept_pieces, swept_shape
+from polepilot.core.planning.target import CHORD, Target
 
 Points = NDArray[np.float64]
 
@@ -20,14 +20,13 @@ _FINE = 0.02
 def trimmed(
     path: Points,
     parts: tuple[PlanPart, ...],
-    target: MultiPolygon,
-    tool: float,
+    target: Target,
     most: float,
 ) -> tuple[Points, tuple[PlanPart, ...]]:
     """The path without as much of its end as can be left out for ``most`` m² of ``target``."""
     if len(path) < 3:
         return path, parts
-    tail = _Tail(path, target, tool)
+    tail = _Tail(path, target)
     kept, gone = 0.0, min(_FIRST, tail.length)
     while tail.loss(gone) <= most:
         kept, gone = gone, min(2 * gone, tail.length)
@@ -39,7 +38,7 @@ def trimmed(
             kept = middle
         else:
             gone = middle
-    kept = min(kept, tail.length - tool)
+    kept = min(kept, tail.length - target.tool)
     if kept <= _FINE:
         return path, parts
     short = tail.without(kept)
@@ -52,17 +51,17 @@ def trimmed(
 class _Tail:
     """The end of a path, and what is swept by it alone."""
 
-    def __init__(self, path: Points, target: MultiPolygon, tool: float) -> None:
+    def __init__(self, path: Points, target: Target) -> None:
         self._path = path
         self._target = target
-        self._tool = tool
+        self._tool = target.tool
         self._marks = np.append(0.0, np.cumsum(np.hypot(*np.diff(path, axis=0).T)))
         self.length = float(self._marks[-1])
-        few = few_corners(path)
+        few = few_corners(path, CHORD)
         self._few, self._few_marks = path[few], self._marks[few]
         pairs = np.stack([self._few[:-1], self._few[1:]], axis=1)
         self._tree = shapely.STRtree(shapely.linestrings(pairs))
-        self._pieces = swept_pieces(self._few, tool / 2)
+        self._pieces = swept_pieces(self._few, target.tool / 2)
 
     def without(self, length: float) -> Points:
         """The path without the last ``length`` metres."""
@@ -80,7 +79,7 @@ class _Tail:
         before = near[near < len(head) - 2]
         last = swept_shape(head[-2:], self._tool)
         rest = swept.difference(shapely.union_all([*self._pieces[before], last]))
-        return float(rest.intersection(self._target).area)
+        return self._target.area_in(rest)
 
     @staticmethod
     def _cut(path: Points, marks: Points, mark: float) -> Points:

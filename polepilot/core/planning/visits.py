@@ -18,16 +18,15 @@ from polepilot.core.geometry import Pose2D
 from polepilot.core.plan import PlanPart
 from polepilot.core.planning.curves import Curve, curve_length, drive, joined, sample
 from polepilot.core.planning.offset import cleanup_strokes
-from polepilot.core.planning.patches import pieces_of, standing_place
+from polepilot.core.planning.patches import patches_of, pieces_of, standing_place
 from polepilot.core.planning.space import FreeSpace, polygons
+from polepilot.core.planning.target import Target
 from polepilot.core.planning.ways import way_to_line, way_to_place
 
 Points = NDArray[np.float64]
 Gears = NDArray[np.int8]
 Indices = NDArray[np.intp]
 
-_SLIVER = 0.002
-"""What is thinner than twice this is left, metres."""
 _MOST_CUTS = 6
 """How often a patch is halved until one place sweeps each piece."""
 _LEG = 0.16
@@ -49,24 +48,22 @@ def with_visits(
     path: Points,
     gear: Gears,
     parts: tuple[PlanPart, ...],
-    missed: shapely.Geometry,
+    target: Target,
     space: FreeSpace,
-    tool: float,
     radius: float,
     smallest: float,
     enough: float,
 ) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
-    """The path with visits to patches of ``missed``, the largest first.
+    """The path with visits to patches that it misses, the largest first.
 
     ``radius``: of the arcs that are driven, metres. ``smallest``: patches smaller than this are
     left, m²; and so are all others as soon as they make up less than ``enough``.
     """
-    opened = missed.buffer(-_SLIVER, quad_segs=2).buffer(_SLIVER, quad_segs=2)
-    patches = [patch for patch in polygons(opened) if patch.area >= smallest]
+    patches = patches_of(target.missed(path), smallest)
     left = sum(float(patch.area) for patch in patches)
     if left <= enough:
         return path, gear, parts
-    visitor = _Visitor(path, gear, space, tool, radius)
+    visitor = _Visitor(path, gear, space, target.tool, radius)
     for patch in sorted(patches, key=lambda p: (-float(p.area), p.bounds)):
         if left <= enough or visitor.hopeless:
             break

@@ -9,16 +9,17 @@ from shapely import MultiPolygon
 
 from polepilot.core.plan import PlanPart
 from polepilot.core.planning.swept import swept_shape
+from polepilot.core.planning.target import Target
 from polepilot.core.planning.trim import trimmed
 
 TOOL = 0.4
-FLOOR = MultiPolygon([shapely.box(-1, -1, 9, 9)])
+FLOOR = Target(MultiPolygon([shapely.box(-1, -1, 9, 9)]), TOOL)
 
 
 def _trimmed(path: list[list[float]], most: float = 0.001) -> np.ndarray:
     points = np.array(path, dtype=float)
     parts = (PlanPart("loop", 0, 2), PlanPart("cleanup", 2, len(points) - 1))
-    short, left = trimmed(points, parts, FLOOR, TOOL, most)
+    short, left = trimmed(points, parts, FLOOR, most)
     lost = swept_shape(points, TOOL).difference(swept_shape(short, TOOL)).area
     assert lost <= most + 1e-4
     assert left[0].first == 0
@@ -41,4 +42,4 @@ def test_a_part_of_a_leg_may_go() -> None:
 def test_new_floor_is_kept() -> None:
     path = [[0, 0], [3, 0], [3, 2], [0, 2]]
     assert _trimmed(path) == pytest.approx(np.array(path))
-    assert trimmed(np.zeros((2, 2)), (), FLOOR, TOOL, 1.0)[0].shape == (2, 2)
+    assert trimmed(np.zeros((2, 2)), (), FLOOR, 1.0)[0].shape == (2, 2)

@@ -11,6 +11,7 @@ from polepilot.core.plan import Plan, PlanPart, Prediction
 from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.space import as_multi, free_space
 from polepilot.core.planning.swept import swept_shape
+from polepilot.core.planning.target import Target
 from polepilot.core.planning.visits import with_visits
 
 TOOL, RADIUS = 0.4, 0.6
@@ -22,8 +23,9 @@ PARTS = (PlanPart("loop", 0, 1),)
 def _visited(missed: shapely.Geometry, enough: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     site = maps.site(maps.box(0, 0, 4, 4))
     space = free_space(site, PlanOptions())
+    target = Target(as_multi(missed), TOOL)
     path, gear, parts = with_visits(
-        PATH, GEAR, PARTS, missed, space, TOOL, RADIUS, smallest=1e-4, enough=enough
+        PATH, GEAR, PARTS, target, space, RADIUS, smallest=1e-4, enough=enough
     )
     assert parts == (PlanPart("loop", 0, len(path) - 1),)
     assert len(gear) == len(path) - 1

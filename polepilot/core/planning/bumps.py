@@ -50,13 +50,13 @@ def bumps_length(patch: Polygon, tool: float) -> float:
     return length / (_PITCH * radius) * 2 * (width + (1 - _RISE) * radius)
 
 
-def short_bumps(patch: Polygon, tool: float) -> bool:
-    """Whether bumps along a patch are shorter than to drive along it and back."""
+def long_for_bumps(patch: Polygon, tool: float) -> bool:
+    """Whether bumps along a patch are no shorter than to drive along it and back."""
     radius = tool / 2
     length = float(patch.length) / 2
     width = float(patch.area) / max(length, 1e-9)
     there_and_back = 2 * max(length - radius, 0.0) + 2 * (radius + width / 2)
-    return bumps_length(patch, tool) < there_and_back
+    return bumps_length(patch, tool) >= there_and_back
 
 
 def with_bumps(

@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -14,10 +13,9 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from polepilot.core.errors import PlanError
-from polepilot.core.geometry import Pose2D, wrap_angle
 from polepilot.core.plan import Plan, PlanPart
-from polepilot.core.planning.bumps import short_bumps
-from polepilot.core.planning.driver import Driver
+from polepilot.core.planning.bumps import long_for_bumps
+from polepilot.core.planning.driven import driven_path
 from polepilot.core.planning.groups import regions_of
 from polepilot.core.planning.offset import (
     OVERLAP,
@@ -25,25 +23,22 @@ from polepilot.core.planning.offset import (
     Stroke,
     cleanup_strokes,
     nested_loops,
-    sharp_space,
 )
 from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.order import Run, ordered_runs
+from polepilot.core.planning.outline import wheel_outlines
 from polepilot.core.planning.patches import patches_of
 from polepilot.core.planning.score import predict
-from polepilot.core.planning.sharp import Recorder, chained, path_cost, sharp_path
+from polepilot.core.planning.sharp import path_cost, sharp_path
 from polepilot.core.planning.space import (
     FreeSpace,
     as_multi,
-    free_poles,
     free_space,
     other_starts,
 )
 from polepilot.core.planning.swept import few_corners, swept_shape
-from polepilot.core.planning.target import Target
-from polepilot.core.planning.track import without_jerks
+from polepilot.core.planning.target import CHORD, Target
 from polepilot.core.planning.unreachable import unreachable_pieces
-from polepilot.core.planning.visits import with_visits
 from polepilot.core.planning.wording import in_words
 from polepilot.core.site import Site
 
@@ -63,10 +58,9 @@ _TOUCH = 0.004
 """How much loops overlap where bumps sweep what is left between them."""
 _GAP = 0.55
 """Tool widths between the two crossings from a loop to another and back."""
-_LEAST = 0.0065
-"""Missed patches smaller than this share of the tool's square get no bump."""
-_ENOUGH = 0.0003
-"""Where less than this share of all is missed, no further patch is visited."""
+_LONG = 3.0
+"""Only missed patches longer than so many tool widths get a pass of their own for a wheel; the
+others are visited from the path."""
 _MANY = 60
 _LARGE = 5000.0
 """Up to so many squares of the tool the coverage is predicted more exactly."""
@@ -104,26 +98,29 @@ def plan_scan(
     wanted = reachable if area is None else as_multi(reachable.intersection(area.buffer(0)))
     if wanted.area < 1e-4:
         raise PlanError("nothing of the area to scan can be reached from the start.")
-    target = Target(wanted, options.tool_width)
+    pieces, swept = [space.polygon], wanted
+    if options.min_turn_radius > 0:
+        pieces, swept = wheel_outlines(site, space, wanted, options.tool_width)
+    target = Target(swept, options.tool_width)
     report(0.1, "loops")
     notes = [*site.repairs, *space.notes]
-    path, gear, parts = _shortest(site, space, options, target, area is None, notes, report)
+    path, gear, parts = _shortest(pieces, space, options, target, area is None, notes, report)
     report(0.8, "unreachable parts")
-    pieces = unreachable_pieces(space, reachable)
+    missing = unreachable_pieces(space, reachable)
     report(0.9, "prediction")
-    if wanted.area < _LARGE * options.tool_width**2:
-        target = Target(wanted, options.tool_width, _EXACT)
-    left = target.missed_area(path)
+    large = wanted.area > _LARGE * options.tool_width**2
+    exact = Target(wanted, options.tool_width, CHORD if large else _EXACT)
+    left = exact.missed_area(path)
     # All that a path sweeps is reachable; with patches it sweeps other floor as well.
-    swept = target.area - left if area is None else swept_shape(path, options.tool_width).area
-    predicted = predict(path, gear, options, 1.0 - left / target.area, swept)
+    under = exact.area - left if area is None else swept_shape(path, options.tool_width).area
+    predicted = predict(path, gear, options, 1.0 - left / exact.area, under)
     report(1.0, "done")
     return Plan(
         mode="scan",
         path=path,
         gear=gear,
         parts=parts,
-        unreachable=pieces,
+        unreachable=missing,
         predicted=predicted,
         tool_width=options.tool_width,
         clearance=options.clearance,
@@ -135,7 +132,7 @@ def plan_scan(
 
 
 def _shortest(
-    site: Site,
+    pieces: list[Polygon],
     space: FreeSpace,
     options: PlanOptions,
     target: Target,
@@ -143,16 +140,17 @@ def _shortest(
     notes: list[str],
     report: Progress,
 ) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
-    """The path; on maps where that is soon done the shortest for some spacings of the loops."""
+    """The path along loops in ``pieces``; on maps where that is soon done the shortest for some
+    spacings of the loops."""
     plain = options.min_turn_radius <= 0
     best: tuple[Points, Gears, tuple[PlanPart, ...]] | None = None
     least = math.inf
     spacings = [_CLOSER[:2], *((closer,) for closer in _CLOSER[2:])] if plain else [_CLOSER]
     trials = [(space, spacing) for spacing in spacings]
-    free_start = options.start is None and site.start is None
+    free_start = space.anywhere
     while trials:
         here, spacing = trials.pop(0)
-        strokes = _strokes(site, here, options, target, whole, spacing)
+        strokes = _strokes(pieces, here, options, target, whole, spacing)
         if not strokes:
             strokes = [_least_stroke(here)]
         report(0.3, "order")
@@ -204,7 +202,7 @@ def _silent(share: float, what: str) -> None:
 
 
 def _strokes(
-    site: Site,
+    pieces: list[Polygon],
     space: FreeSpace,
     options: PlanOptions,
     target: Target,
@@ -214,23 +212,18 @@ def _strokes(
     """Loops and clean-up passes for ``target``; for patches only passes and what loops cross it."""
     tool = options.tool_width
     smallest = _SMALLEST * (tool / 0.4) ** 2
-    if options.min_turn_radius > 0:
-        pieces = sharp_space(site, space, free_poles(site))
-        tolerance = min(0.02, 0.05 * tool)
-    else:
-        pieces = [space.polygon]
-        tolerance = min(0.002, 0.01 * tool)
+    plain = options.min_turn_radius <= 0
+    tolerance = min(0.002, 0.01 * tool) if plain else min(0.02, 0.05 * tool)
     if not whole:
         loops = _patch_strokes(pieces, target.shape, tool, tolerance)
-        return _completed(loops, space, target, smallest)
+        return _completed(loops, space, target, smallest, _always if plain else _long)
     if options.order == "paper":
         pieces = [region for piece in pieces for region in regions_of(piece, tool)]
     best: list[Stroke] = []
     least = math.inf
-    plain = options.min_turn_radius <= 0
     for closer in spacings:
         loops = nested_loops(pieces, tool, tolerance, closer, _TOUCH if plain else OVERLAP)
-        strokes = _completed(loops, space, target, smallest, bumps=plain)
+        strokes = _completed(loops, space, target, smallest, long_for_bumps if plain else _long)
         # Each clean-up pass has to be gone to and left again.
         extra = 2 * tool * (1 + (options.min_turn_radius > 0))
         cost = sum(s.line.length + (0.0 if s.closed else extra) for s in strokes)
@@ -246,20 +239,16 @@ def _completed(
     space: FreeSpace,
     target: Target,
     smallest: float,
-    bumps: bool = False,
+    passed: Callable[[Polygon, float], bool],
 ) -> list[Stroke]:
-    """Loops with the clean-up passes for what they miss of ``target``.
-
-    ``bumps``: without those patches to which bumps of the path will be shorter.
-    """
+    """Loops with the clean-up passes for those patches that they miss of ``target`` and that are
+    to be ``passed`` over by a tool of some width."""
     strokes, tool = list(loops), target.tool
     for _ in range(2):
         missed: shapely.Geometry = target.shape
         if strokes:
             missed = target.missed(*(stroke.track for stroke in strokes))
-            if bumps:
-                patches = patches_of(missed, smallest)
-                missed = MultiPolygon([p for p in patches if not short_bumps(p, tool)])
+            missed = MultiPolygon([p for p in patches_of(missed, smallest) if passed(p, tool)])
         more = cleanup_strokes(missed, tool, space, smallest)
         strokes += more
         if not more:
@@ -267,6 +256,17 @@ def _completed(
     if not strokes:
         strokes = cleanup_strokes(target.shape, tool, space, 0.0)
     return strokes
+
+
+def _always(patch: Polygon, tool: float) -> bool:
+    """Every patch gets a pass."""
+    del patch, tool
+    return True
+
+
+def _long(patch: Polygon, tool: float) -> bool:
+    """Whether a wheel does better with a pass along a patch than with visits to it."""
+    return bool(patch.length > 2 * _LONG * tool)
 
 
 def _patch_strokes(
@@ -298,101 +298,4 @@ def _path(
     if options.min_turn_radius <= 0:
         path, parts = sharp_path(runs, space, options, target, notes)
         return path, np.ones(len(path) - 1, np.int8), parts
-    return _driven_path(runs, space, options, target, notes)
-
-
-def _driven_path(
-    runs: list[Run],
-    space: FreeSpace,
-    options: PlanOptions,
-    target: Target,
-    notes: list[str],
-) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
-    """Followable by a steered wheel; what its curves miss is visited at the end."""
-    driver, recorder, least = None, Recorder(), math.inf
-    for heading in _headings(space, runs):
-        trial = Driver(
-            space, options.min_turn_radius, Pose2D(space.start.x, space.start.y, heading)
-        )
-        record = Recorder()
-        _drive(trial, runs, record, options)
-        path, _ = trial.track.arrays()
-        left = target.missed_area(path)
-        if left < least:
-            driver, recorder, least = trial, record, left
-        if left < 0.1 * target.area:
-            break
-    assert driver is not None  # there is at least one heading
-    for _ in range(2):
-        path, _ = driver.track.arrays()
-        missed = target.missed(path)
-        smallest = _SMALLEST * (options.tool_width / 0.4) ** 2
-        more = cleanup_strokes(missed, options.tool_width, space, smallest)
-        if not more:
-            break
-        pose = driver.track.pose
-        _drive(driver, chained(more, pose.position), recorder, options)
-    path, gear = driver.track.arrays()
-    parts = tuple(recorder.parts)
-    if len(path) > 1:
-        tool = options.tool_width
-        for _ in range(2):
-            path, gear, parts = with_visits(
-                path,
-                gear,
-                parts,
-                target,
-                space,
-                driver.track.radius,
-                _LEAST * tool**2,
-                _ENOUGH * target.area,
-            )
-    left = target.missed_area(path)
-    if left > 0.02 * target.area:
-        notes.append(
-            f"{left:.2f} m² cannot be swept with a turning radius of "
-            f"{in_words(options.min_turn_radius)} and a clearance of {in_words(options.clearance)}."
-        )
-    if len(path) < 2:
-        raise PlanError(
-            f"the robot cannot move from the start with a turning radius of "
-            f"{in_words(options.min_turn_radius)}."
-        )
-    path, gear, moved = without_jerks(path, gear)
-    return path, gear, _moved_parts(parts, moved)
-
-
-def _moved_parts(parts: tuple[PlanPart, ...], moved: NDArray[np.intp]) -> tuple[PlanPart, ...]:
-    """Parts of a path of which some points were left out; ``moved``: where the others are now."""
-    ends = [0, *(int(moved[part.last]) for part in parts)]
-    return tuple(
-        PlanPart(part.kind, first, last)
-        for part, (first, last) in zip(parts, pairwise(ends), strict=True)
-        if last > first
-    )
-
-
-def _headings(space: FreeSpace, runs: list[Run]) -> list[float]:
-    """The start's heading; where it has none, along the first run, then others to try."""
-    start = space.start
-    if start.heading is not None:
-        return [start.heading]
-    first = runs[0].points
-    aim = first[0] if math.dist(first[0], start.position) > 0.05 else first[1]
-    along = math.atan2(aim[1] - start.y, aim[0] - start.x)
-    return [wrap_angle(along + turn * math.pi / 2) for turn in (0, 2, 1, 3)]
-
-
-def _drive(driver: Driver, runs: list[Run], recorder: Recorder, options: PlanOptions) -> None:
-    """Drives the runs; leaves out what cannot be reached or followed."""
-    for run in runs:
-        here = driver.track.pose.position
-        points = driver.enter(run.points)
-        if points is None:
-            recorder.close("link", driver.track.last)
-            continue
-        place = (float(points[0, 0]), float(points[0, 1]))
-        near = bool(recorder.parts) and math.dist(here, place) <= 1.6 * options.tool_width
-        recorder.close("bridge" if near else "link", driver.track.last)
-        driver.follow(points)
-        recorder.close("loop" if run.stroke.closed else "cleanup", driver.track.last)
+    return driven_path(runs, space, options, target, notes)

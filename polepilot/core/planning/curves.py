@@ -124,9 +124,15 @@ def _curves(x: float, y: float, turn: float, change: float) -> tuple[Curve, ...]
     """The ``_MOST`` best for radius 1; only those that are looked at are driven."""
     found: dict[tuple[tuple[str, float], ...], float] = {}
     for curve in _words(x, y, turn):
-        short = tuple((kind, length) for kind, length in curve if abs(length) > 1e-7)
-        if short:
-            found[short] = curve_length(short) + change * gear_changes(short)
+        cost, forward = 0.0, None
+        for _, length in curve:
+            cost += abs(length)
+            if forward is not None and forward != (length > 0) and abs(length) > 1e-6:
+                cost += change
+            if abs(length) > 1e-6:
+                forward = length > 0
+        if cost > 1e-7:
+            found[tuple([piece for piece in curve if abs(piece[1]) > 1e-7])] = cost
     best: dict[tuple[tuple[str, float], ...], Curve] = {}
     for curve in sorted(found, key=lambda curve: (found[curve], curve)):
         name = tuple((kind, round(length, 6)) for kind, length in curve)

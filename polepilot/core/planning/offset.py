@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from shapely import LineString, Polygon
 
 from polepilot.core.planning.patches import patches_of
-from polepilot.core.planning.space import MARGIN, FreeSpace, polygons, quadrant
-from polepilot.core.site import Site
+from polepilot.core.planning.space import FreeSpace, polygons, quadrant
 
 Points = NDArray[np.float64]
 
@@ -50,26 +49,6 @@ class Stroke:
     @property
     def line(self) -> LineString:
         return LineString(self.track)
-
-
-def sharp_space(site: Site, space: FreeSpace, poles: list[tuple[float, float]]) -> list[Polygon]:
-    """The free space with corners instead of arcs around obstacles: fewer turns for a wheel.
-
-    It is a part of the free space; in tight places it is less than that.
-    """
-    radius = space.clearance + MARGIN
-    sharp = space.floor.buffer(-radius, join_style="mitre", mitre_limit=2.0)
-    things = [LineString(wall) for wall in site.walls]
-    if things:
-        boxes = shapely.buffer(
-            np.array(things), radius, cap_style="square", join_style="mitre", mitre_limit=2.0
-        )
-        sharp = sharp.difference(shapely.union_all(boxes))
-    if poles:
-        squares = shapely.buffer(shapely.points(poles), radius, cap_style="square")
-        sharp = sharp.difference(shapely.union_all(squares))
-    inside = shapely.intersection(sharp, space.polygon)
-    return [piece for piece in polygons(inside) if piece.area > 1e-4]
 
 
 def nested_loops(

@@ -192,8 +192,11 @@ class Recorder:
 
     def __init__(self) -> None:
         self.parts: list[PlanPart] = []
+        self.ahead = 0
+        """How many more points the path has before those that are counted here."""
 
     def close(self, kind: PartKind, last: int) -> None:
+        last += self.ahead
         first = self.parts[-1].last if self.parts else 0
         if last > first:
             if self.parts and self.parts[-1].kind == kind and kind != "loop":

@@ -61,6 +61,8 @@ class FreeSpace:
     clearance: float
     start: Start
     """Inside ``polygon``."""
+    anywhere: bool = False
+    """Whether nobody has said where to start."""
     notes: list[str] = field(default_factory=list)
     _loose: Polygon = field(init=False)
     _graphs: list[_Graph] = field(init=False, default_factory=list)
@@ -221,6 +223,7 @@ def free_space(site: Site, options: PlanOptions) -> FreeSpace:
             f"{in_words(options.clearance)} it needs passages of {in_words(2 * options.clearance)}."
         )
     start = options.start or site.start
+    anywhere = start is None
     notes: list[str] = []
     if start is None:
         home = pieces[0]
@@ -235,6 +238,7 @@ def free_space(site: Site, options: PlanOptions) -> FreeSpace:
         others=tuple(piece for piece in pieces if piece is not home),
         clearance=options.clearance,
         start=start,
+        anywhere=anywhere,
         notes=notes,
     )
 

@@ -1,0 +1,157 @@
+"""A path for a steered front wheel: runs driven one by one, what its curves miss visited."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polepilot.core.errors import PlanError
+from polepilot.core.geometry import Pose2D, wrap_angle
+from polepilot.core.plan import PlanPart
+from polepilot.core.planning.driver import Driver
+from polepilot.core.planning.offset import Points, cleanup_strokes
+from polepilot.core.planning.options import PlanOptions
+from polepilot.core.planning.order import Run
+from polepilot.core.planning.sharp import Recorder, chained
+from polepilot.core.planning.space import FreeSpace
+from polepilot.core.planning.target import Target
+from polepilot.core.planning.track import without_jerks
+from polepilot.core.planning.visits import with_visits
+from polepilot.core.planning.wording import in_words
+
+Gears = NDArray[np.int8]
+Parts = tuple[PlanPart, ...]
+Driven = tuple[Points, Gears, Parts]
+
+_LEAST = 0.0065
+"""Missed patches smaller than this share of the tool's square are not visited."""
+_ENOUGH = 0.0003
+"""Where less than this share of all is missed, no further patch is visited."""
+_WORTH = 0.1
+"""Missed patches larger than this share of the tool's square are driven to from the end."""
+
+
+def driven_path(
+    runs: list[Run],
+    space: FreeSpace,
+    options: PlanOptions,
+    target: Target,
+    notes: list[str],
+) -> Driven:
+    """Followable by a steered wheel; what its curves miss is visited at the end."""
+    driver, recorder, least = None, Recorder(), math.inf
+    for heading in _headings(space, runs):
+        trial = Driver(
+            space, options.min_turn_radius, Pose2D(space.start.x, space.start.y, heading)
+        )
+        record = Recorder()
+        _drive(trial, runs, record, options)
+        path, _ = trial.track.arrays()
+        left = target.missed_area(path)
+        if left < least:
+            driver, recorder, least = trial, record, left
+        if left < 0.1 * target.area:
+            break
+    assert driver is not None  # there is at least one heading
+    path, gear = driver.track.arrays()
+    parts = tuple(recorder.parts)
+    if len(path) > 1:
+        path, gear, parts = _visited(path, gear, parts, space, driver.track.radius, target)
+        longer = _passed(path, gear, parts, driver, space, options, target)
+        if longer is not None:
+            path, gear, parts = _visited(*longer, space, driver.track.radius, target)
+    left = target.missed_area(path)
+    if left > 0.02 * target.area:
+        notes.append(
+            f"{left:.2f} m² cannot be swept with a turning radius of "
+            f"{in_words(options.min_turn_radius)} and a clearance of {in_words(options.clearance)}."
+        )
+    if len(path) < 2:
+        raise PlanError(
+            f"the robot cannot move from the start with a turning radius of "
+            f"{in_words(options.min_turn_radius)}."
+        )
+    path, gear, moved = without_jerks(path, gear)
+    return path, gear, _moved_parts(parts, moved)
+
+
+def _visited(
+    path: Points,
+    gear: Gears,
+    parts: Parts,
+    space: FreeSpace,
+    radius: float,
+    target: Target,
+) -> Driven:
+    """The path with visits to what it misses, and to what those miss."""
+    smallest, enough = _LEAST * target.tool**2, _ENOUGH * target.area
+    for _ in range(2):
+        before = len(path)
+        path, gear, parts = with_visits(path, gear, parts, target, space, radius, smallest, enough)
+        if len(path) == before:
+            break
+    return path, gear, parts
+
+
+def _passed(
+    path: Points,
+    gear: Gears,
+    parts: Parts,
+    driver: Driver,
+    space: FreeSpace,
+    options: PlanOptions,
+    target: Target,
+) -> Driven | None:
+    """The path with passes at its end over what lies too far from it for visits; None: nothing.
+
+    ``driver`` stands where the path ends.
+    """
+    more = cleanup_strokes(target.missed(path), target.tool, space, _WORTH * target.tool**2)
+    if not more:
+        return None
+    last, recorder = driver.track.last, Recorder()
+    recorder.parts += parts
+    recorder.ahead = len(path) - 1 - last
+    _drive(driver, chained(more, driver.track.pose.position), recorder, options)
+    points, gears = driver.track.arrays()
+    longer = np.vstack([path, points[last + 1 :]]), np.concatenate([gear, gears[last:]])
+    return *longer, tuple(recorder.parts)
+
+
+def _moved_parts(parts: Parts, moved: NDArray[np.intp]) -> Parts:
+    """Parts of a path of which some points were left out; ``moved``: where the others are now."""
+    ends = [0, *(int(moved[part.last]) for part in parts)]
+    return tuple(
+        PlanPart(part.kind, first, last)
+        for part, (first, last) in zip(parts, pairwise(ends), strict=True)
+        if last > first
+    )
+
+
+def _headings(space: FreeSpace, runs: list[Run]) -> list[float]:
+    """The start's heading; where it has none, along the first run, then others to try."""
+    start = space.start
+    if start.heading is not None:
+        return [start.heading]
+    first = runs[0].points
+    aim = first[0] if math.dist(first[0], start.position) > 0.05 else first[1]
+    along = math.atan2(aim[1] - start.y, aim[0] - start.x)
+    return [wrap_angle(along + turn * math.pi / 2) for turn in (0, 2, 1, 3)]
+
+
+def _drive(driver: Driver, runs: list[Run], recorder: Recorder, options: PlanOptions) -> None:
+    """Drives the runs; leaves out what cannot be reached or followed."""
+    for run in runs:
+        here = driver.track.pose.position
+        points = driver.enter(run.points)
+        if points is None:
+            recorder.close("link", driver.track.last)
+            continue
+        place = (float(points[0, 0]), float(points[0, 1]))
+        near = bool(recorder.parts) and math.dist(here, place) <= 1.6 * options.tool_width
+        recorder.close("bridge" if near else "link", driver.track.last)
+        driver.follow(points)
+        recorder.close("loop" if run.stroke.closed else "cleanup", driver.track.last)

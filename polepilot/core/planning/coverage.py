@@ -61,6 +61,8 @@ _GAP = 0.55
 _LONG = 3.0
 """Only missed patches longer than so many tool widths get a pass of their own for a wheel; the
 others are visited from the path."""
+_RAGGED = 0.1
+"""How exactly the outlines of patches are followed, in tool widths."""
 _MANY = 60
 _LARGE = 5000.0
 """Up to so many squares of the tool the coverage is predicted more exactly."""
@@ -163,7 +165,7 @@ def _shortest(
             gap=0.0 if options.min_turn_radius > 0 else _GAP * options.tool_width,
         )
         report(0.5, "path")
-        found = _path(runs, here, options, target, notes if best is None else [])
+        found = _path(runs, here, options, target, notes if best is None else [], whole)
         corners = len(few_corners(found[0]))
         if not plain or not whole or options.order == "paper" or corners > _SOON[0]:
             return best or found
@@ -279,6 +281,7 @@ def _patch_strokes(
         if patch.buffer(-0.55 * tool).is_empty:
             continue
         inner = patch.buffer(-0.4 * tool, join_style="mitre", mitre_limit=1.5)
+        inner = inner.simplify(_RAGGED * tool)
         spots = [
             part
             for part in shapely.get_parts(inner.intersection(room)).tolist()
@@ -294,8 +297,9 @@ def _path(
     options: PlanOptions,
     target: Target,
     notes: list[str],
+    whole: bool,
 ) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
     if options.min_turn_radius <= 0:
         path, parts = sharp_path(runs, space, options, target, notes)
         return path, np.ones(len(path) - 1, np.int8), parts
-    return driven_path(runs, space, options, target, notes)
+    return driven_path(runs, space, options, target, notes, whole)

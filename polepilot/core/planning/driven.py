@@ -17,6 +17,7 @@ from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.order import Run
 from polepilot.core.planning.sharp import Recorder, chained
 from polepilot.core.planning.space import FreeSpace
+from polepilot.core.planning.swept import SMALLEST_PATCH
 from polepilot.core.planning.target import Target
 from polepilot.core.planning.track import without_jerks
 from polepilot.core.planning.visits import with_visits
@@ -28,6 +29,8 @@ Driven = tuple[Points, Gears, Parts]
 
 _LEAST = 0.0065
 """Missed patches smaller than this share of the tool's square are not visited."""
+_CRUMB = SMALLEST_PATCH / 0.4**2
+"""Nor those smaller than this where only a rest is to be swept."""
 _ENOUGH = 0.0003
 """Where less than this share of all is missed, no further patch is visited."""
 _WORTH = 0.1
@@ -40,8 +43,12 @@ def driven_path(
     options: PlanOptions,
     target: Target,
     notes: list[str],
+    whole: bool = True,
 ) -> Driven:
-    """Followable by a steered wheel; what its curves miss is visited at the end."""
+    """Followable by a steered wheel; what its curves miss is visited at the end.
+
+    ``whole``: else the target is what was left before, of which crumbs are left again.
+    """
     driver, recorder, least = None, Recorder(), math.inf
     for heading in _headings(space, runs):
         trial = Driver(
@@ -59,10 +66,12 @@ def driven_path(
     path, gear = driver.track.arrays()
     parts = tuple(recorder.parts)
     if len(path) > 1:
-        path, gear, parts = _visited(path, gear, parts, space, driver.track.radius, target)
+        smallest = (_LEAST if whole else _CRUMB) * target.tool**2
+        radius = driver.track.radius
+        path, gear, parts = _visited(path, gear, parts, space, radius, target, smallest)
         longer = _passed(path, gear, parts, driver, space, options, target)
         if longer is not None:
-            path, gear, parts = _visited(*longer, space, driver.track.radius, target)
+            path, gear, parts = _visited(*longer, space, radius, target, smallest)
     left = target.missed_area(path)
     if left > 0.02 * target.area:
         notes.append(
@@ -85,9 +94,10 @@ def _visited(
     space: FreeSpace,
     radius: float,
     target: Target,
+    smallest: float,
 ) -> Driven:
     """The path with visits to what it misses, and to what those miss."""
-    smallest, enough = _LEAST * target.tool**2, _ENOUGH * target.area
+    enough = _ENOUGH * target.area
     for _ in range(2):
         before = len(path)
         path, gear, parts = with_visits(path, gear, parts, target, space, radius, smallest, enough)

@@ -56,4 +56,11 @@ class Footprint:
 
     def ground(self, places: shapely.Geometry) -> shapely.Geometry:
         """What it takes up of the floor while `base_link` goes everywhere in ``places``."""
-        return places.buffer(self.radius, quad_segs=self.quadrant)
+        ground = places.buffer(self.radius, quad_segs=self.quadrant)
+        if ground.is_valid:
+            return ground
+        # Where arcs nearly touch each other GEOS may let them cross, and fill what lies between.
+        rims = [shapely.get_coordinates(rim) for rim in shapely.get_parts(places.boundary)]
+        sides = np.concatenate([np.stack([rim[:-1], rim[1:]], axis=1) for rim in rims])
+        discs = shapely.buffer(shapely.linestrings(sides), self.radius, quad_segs=self.quadrant)
+        return shapely.union_all([places, *discs])

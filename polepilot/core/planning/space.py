@@ -88,10 +88,7 @@ class FreeSpace:
 
     def reachable(self) -> MultiPolygon:
         """The union of the clearance discs whose centres are in ``polygon``."""
-        discs = footprint(self.clearance).ground(self.polygon)
-        if not discs.is_valid:  # where arcs nearly touch each other, GEOS may let them cross
-            discs = shapely.make_valid(discs, method="structure", keep_collapsed=False)
-        return as_multi(discs)
+        return as_multi(footprint(self.clearance).ground(self.polygon))
 
     def nearest(self, point: geometry.Point) -> geometry.Point:
         """The place of the free space nearest to ``point``."""

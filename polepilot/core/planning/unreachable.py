@@ -14,7 +14,9 @@ from polepilot.core.planning.wording import in_words
 
 SMALLEST = 0.05
 """Smaller pieces are not mentioned, m²."""
-_SLIVER = 0.003
+_CRUMB = 0.01
+"""What a thin wall cuts off is left out if it is smaller than this share of the whole."""
+_SLIVER = 0.0006
 _GRID = 1e-4
 _MOST_REASONS = 25
 """The largest pieces are looked into one by one; a map with more has other problems."""
@@ -22,15 +24,16 @@ _MOST_REASONS = 25
 
 def unreachable_pieces(space: FreeSpace, reachable: MultiPolygon) -> tuple[Unreachable, ...]:
     """The floor that ``reachable`` leaves, piece by piece, the largest first; rings are split."""
-    walls = space.lines.buffer(0.001) if not space.lines.is_empty else space.lines
+    walls = space.lines.buffer(0.0002) if not space.lines.is_empty else space.lines
     rest = space.floor.difference(reachable.buffer(_SLIVER))
     # On both sides of a thin wall there may be parts of a piece that is large enough only whole.
     whole_ones = [part for part in polygons(rest) if part.area >= SMALLEST * 0.8]
-    large = shapely.union_all(
-        [part for part in whole_ones if _grown(part, space, reachable).area >= SMALLEST]
-    )
+    parts: list[Polygon] = []
+    for large in whole_ones:
+        if _grown(large, space, reachable).area >= SMALLEST:
+            least = min(SMALLEST / 5, _CRUMB * large.area)
+            parts += [part for part in polygons(large.difference(walls)) if part.area >= least]
     pieces: list[tuple[Polygon, str]] = []
-    parts = [part for part in polygons(large.difference(walls)) if part.area >= SMALLEST / 5]
     passages = _Passages(space)
     for index, part in enumerate(sorted(parts, key=lambda p: -float(p.area))):
         whole = _grown(part, space, reachable)
@@ -40,7 +43,9 @@ def unreachable_pieces(space: FreeSpace, reachable: MultiPolygon) -> tuple[Unrea
             reason = f"the robot needs {in_words(2 * space.clearance)} of width to get in"
         pieces += [(simple, reason) for simple in _on_grid(whole)]
     return tuple(
-        Unreachable(_ring(piece), reason) for piece, reason in pieces if piece.area >= SMALLEST / 5
+        Unreachable(_ring(piece), reason)
+        for piece, reason in pieces
+        if piece.area >= _CRUMB * SMALLEST
     )
 
 
@@ -120,7 +125,7 @@ def _on_grid(piece: Polygon) -> list[Polygon]:
 
     Rounding corner by corner would let the two sides of a slit along a wall cross.
     """
-    parts = _without_holes(piece.simplify(0.002))
+    parts = _without_holes(piece.simplify(0.0005))
     for _ in range(3):
         parts = [q for part in parts for q in polygons(shapely.set_precision(part, _GRID))]
         if not any(part.interiors for part in parts):

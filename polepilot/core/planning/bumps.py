@@ -38,6 +38,8 @@ _ROUND = 8
 """Segments per quarter turn of a capsule."""
 _FAR = 8.0
 """Bumps farther from each other than this, in the tool's radii, do not know of each other."""
+_LONGEST = 100.0
+"""Along a patch longer than so many tool widths there are no bumps."""
 _MOST_CUTS = 7
 """How often a patch is halved until one place sweeps each piece."""
 
@@ -51,9 +53,11 @@ def bumps_length(patch: Polygon, tool: float) -> float:
 
 
 def long_for_bumps(patch: Polygon, tool: float) -> bool:
-    """Whether bumps along a patch are no shorter than to drive along it and back."""
+    """Whether bumps along a patch are no shorter than to drive along it and back, or too many."""
     radius = tool / 2
     length = float(patch.length) / 2
+    if length > _LONGEST * tool:
+        return True
     width = float(patch.area) / max(length, 1e-9)
     there_and_back = 2 * max(length - radius, 0.0) + 2 * (radius + width / 2)
     return bumps_length(patch, tool) >= there_and_back

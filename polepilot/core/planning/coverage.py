@@ -65,7 +65,8 @@ _RAGGED = 0.1
 """How exactly the outlines of patches are followed, in tool widths."""
 _MANY = 60
 _LARGE = 5000.0
-"""Up to so many squares of the tool the coverage is predicted more exactly."""
+"""Up to so many squares of the tool several spacings are tried, and the coverage is predicted more
+exactly."""
 _EXACT = 0.0002
 """How exactly the coverage is predicted, in metres along the edge of what is swept."""
 _SMALLEST = 0.008
@@ -167,7 +168,8 @@ def _shortest(
         report(0.5, "path")
         found = _path(runs, here, options, target, notes if best is None else [], whole)
         corners = len(few_corners(found[0]))
-        if not plain or not whole or options.order == "paper" or corners > _SOON[0]:
+        large = corners > _SOON[0] or target.area > _LARGE * target.tool**2
+        if not plain or not whole or options.order == "paper" or large:
             return best or found
         cost = path_cost(found[0], target)
         if cost < least:

@@ -7,9 +7,9 @@ is checked by driving it, so that only those that arrive are returned.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator
-from functools import lru_cache
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from polepilot.core.geometry import Pose2D, wrap_angle
 
+Array = NDArray[np.float64]
 Piece = tuple[str, float]
 """("S" straight, "L" left or "R" right, signed length in metres: backward negative)."""
 Curve = tuple[Piece, ...]
@@ -109,128 +110,152 @@ def sample(
 
 def shortest_curves(start: Pose2D, goal: Pose2D, radius: float, change: float) -> list[Curve]:
     """Curves from ``start`` to ``goal``, the best first: length plus ``change`` metres per gear."""
-    x, y = start.to_local(goal.position)
-    turn = wrap_angle(goal.heading - start.heading)
+    return shortest_curves_each([(start, goal)], radius, change)[0]
+
+
+def shortest_curves_each(
+    ways: Sequence[tuple[Pose2D, Pose2D]], radius: float, change: float
+) -> list[list[Curve]]:
+    """The same for many starts and goals at once."""
+    goals = np.array(
+        [
+            (*start.to_local(goal.position), wrap_angle(goal.heading - start.heading) * radius)
+            for start, goal in ways
+        ]
+    )
     return [
-        tuple((kind, length * radius) for kind, length in curve)
-        for curve in _curves(
-            round(x / radius, 9), round(y / radius, 9), round(turn, 9), round(change / radius, 6)
-        )
+        [tuple((kind, length * radius) for kind, length in curve) for curve in curves]
+        for curves in _curves(np.round(goals / radius, 9), round(change / radius, 6))
     ]
 
 
-@lru_cache(maxsize=20_000)
-def _curves(x: float, y: float, turn: float, change: float) -> tuple[Curve, ...]:
-    """The ``_MOST`` best for radius 1; only those that are looked at are driven."""
-    found: dict[tuple[tuple[str, float], ...], float] = {}
-    for curve in _words(x, y, turn):
-        cost, forward = 0.0, None
-        for _, length in curve:
-            cost += abs(length)
-            if forward is not None and forward != (length > 0) and abs(length) > 1e-6:
-                cost += change
-            if abs(length) > 1e-6:
-                forward = length > 0
-        if cost > 1e-7:
-            found[tuple([piece for piece in curve if abs(piece[1]) > 1e-7])] = cost
-    best: dict[tuple[tuple[str, float], ...], Curve] = {}
-    for curve in sorted(found, key=lambda curve: (found[curve], curve)):
-        name = tuple((kind, round(length, 6)) for kind, length in curve)
-        if name not in best and _arrives(curve, x, y, turn):
-            best[name] = curve
-            if len(best) == _MOST:
+def _curves(goals: Array, change: float) -> list[list[Curve]]:
+    """The ``_MOST`` best for radius 1 to each of N goals x, y, heading."""
+    with np.errstate(invalid="ignore"):  # what is no number is no curve
+        kinds, lengths = _words(*goals.T)
+        cost = np.abs(lengths).sum(axis=2)
+        forward = np.zeros(cost.shape)
+        for piece in range(lengths.shape[2]):
+            length = lengths[:, :, piece]
+            way = np.where(np.abs(length) > 1e-6, np.sign(length), forward)
+            cost += change * ((forward != 0) & (way != forward))
+            forward = way
+        good = _arrive(kinds, lengths, goals) & (cost > 1e-7)
+    cost = np.where(good, np.round(cost, 9), np.inf)
+    found: list[list[Curve]] = []
+    for goal in range(len(goals)):
+        best: dict[tuple[Piece, ...], Curve] = {}
+        for word in np.argsort(cost[:, goal], kind="stable").tolist():
+            if not good[word, goal] or len(best) == _MOST:
                 break
-    return tuple(best.values())
+            pieces = zip(_WORDS[word], lengths[word, goal].tolist(), strict=False)
+            curve = tuple((kind, length) for kind, length in pieces if abs(length) > 1e-7)
+            best.setdefault(tuple((kind, round(length, 6)) for kind, length in curve), curve)
+        found.append(list(best.values()))
+    return found
 
 
-def _arrives(curve: Curve, x: float, y: float, turn: float) -> bool:
-    """Whether the curve, driven from the origin with radius 1, ends in the pose x, y, turn."""
-    here_x, here_y, heading = 0.0, 0.0, 0.0
-    for kind, length in curve:
-        sin, cos = math.sin(heading), math.cos(heading)
-        if kind == "S":
-            here_x += length * cos
-            here_y += length * sin
-            continue
-        side = 1.0 if kind == "L" else -1.0
-        heading += side * length
-        here_x += side * (math.sin(heading) - sin)
-        here_y -= side * (math.cos(heading) - cos)
-    return math.hypot(here_x - x, here_y - y) + abs(wrap_angle(heading - turn)) < 1e-6
+def _arrive(kinds: Array, lengths: Array, goals: Array) -> NDArray[np.bool_]:
+    """Which of the words, driven from the origin with radius 1, end in their goals."""
+    x, y, heading = np.zeros((3, *lengths.shape[:2]))
+    for piece in range(lengths.shape[2]):
+        side, length = kinds[:, piece, None], lengths[:, :, piece]
+        turned = heading + side * length
+        straight = side == 0
+        cos, sin = np.cos(heading), np.sin(heading)
+        x = x + np.where(straight, length * cos, side * (np.sin(turned) - sin))
+        y = y + np.where(straight, length * sin, side * (cos - np.cos(turned)))
+        heading = turned
+    off = np.abs(_wrapped(heading - goals[:, 2]))
+    return np.asarray(np.hypot(x - goals[:, 0], y - goals[:, 1]) + off < 1e-6)
 
 
-def _words(x: float, y: float, turn: float) -> Iterator[Curve]:
-    """Each family as it is, driven backward (x, turn negated), mirrored (y, turn), and both."""
-    cos, sin = math.cos(turn), math.sin(turn)
+_FAMILIES = ("LSL", "LSR", "LRL", "LRLR", "LRLR", "LRSL", "LRSR", "LRSLR")
+_LONGEST = 5
+_SIDES = {"L": 1.0, "R": -1.0, "S": 0.0}
+_MIRRORED = str.maketrans("LR", "RL")
+_FORMS = tuple(itertools.product((False, True), (1.0, -1.0), (1.0, -1.0)))
+"""Each family is driven as it is or from its end, forward or backward, and mirrored."""
+_WORDS = tuple(
+    (family[::-1] if reverse else family).translate(_MIRRORED if mirror < 0 else {})
+    for family in _FAMILIES
+    for reverse, _, mirror in _FORMS
+)
+_KINDS = np.array([[_SIDES[kind] for kind in word.ljust(_LONGEST, "S")] for word in _WORDS])
+
+
+def _words(x: Array, y: Array, turn: Array) -> tuple[Array, Array]:
+    """Sides of the pieces of each word, W x 5, and their lengths, W x N x 5; NaN: not possible."""
+    cos, sin = np.cos(turn), np.sin(turn)
     # The same curve driven from its end: the way back, read in reverse.
-    for px, py, reverse in ((x, y, False), (x * cos + y * sin, x * sin - y * cos, True)):
-        for back in (1.0, -1.0):
-            for mirror in (1.0, -1.0):
-                for curve in _families(back * px, mirror * py, back * mirror * turn):
-                    side = {"L": "R", "R": "L", "S": "S"} if mirror < 0 else None
-                    whole = tuple(
-                        (side[kind] if side else kind, back * length) for kind, length in curve
-                    )
-                    yield whole[::-1] if reverse else whole
+    ends = {False: (x, y), True: (x * cos + y * sin, x * sin - y * cos)}
+    forms = [
+        (back * ends[reverse][0], mirror * ends[reverse][1], back * mirror * turn)
+        for reverse, back, mirror in _FORMS
+    ]
+    families = _families(*np.array(forms).transpose(1, 0, 2))
+    backs = np.array([back for _, back, _ in _FORMS])[:, None]
+    lengths = np.zeros((len(_FAMILIES), len(_FORMS), len(x), _LONGEST))
+    half = len(_FORMS) // 2
+    for index, family in enumerate(families):
+        for place, length in enumerate(family):
+            lengths[index, :half, :, place] = (backs * length)[:half]
+            lengths[index, half:, :, len(family) - 1 - place] = (backs * length)[half:]
+    return _KINDS, lengths.reshape(len(_WORDS), len(x), _LONGEST)
 
 
-def _families(x: float, y: float, turn: float) -> Iterator[Curve]:
-    """Sections 8.1 to 8.11 of the paper, radius 1, for a goal at x, y with heading ``turn``."""
-    sin, cos = math.sin(turn), math.cos(turn)
+def _families(x: Array, y: Array, turn: Array) -> Iterator[tuple[Array, ...]]:
+    """Sections 8.1 to 8.11 of the paper, radius 1, for goals at x, y with heading ``turn``: the
+    lengths of the pieces of each of ``_FAMILIES``."""
+    sin, cos = np.sin(turn), np.cos(turn)
     # The goal's left circle, and its right circle, seen from the start's left circle.
     lx, ly = x - sin, y - 1 + cos
     rx, ry = x + sin, y - 1 - cos
-    l_rho, l_theta = math.hypot(lx, ly), math.atan2(ly, lx)
-    r_rho, r_theta = math.hypot(rx, ry), math.atan2(ry, rx)
+    l_rho, l_theta = np.hypot(lx, ly), np.arctan2(ly, lx)
+    r_rho, r_theta = np.hypot(rx, ry), np.arctan2(ry, rx)
+    half = np.full_like(x, -math.pi / 2)
     # L+ S+ L+
-    yield ("L", _m(l_theta)), ("S", l_rho), ("L", _m(turn - l_theta))
+    yield _wrapped(l_theta), l_rho, _wrapped(turn - l_theta)
     # L+ S+ R+
-    if r_rho >= 2:
-        u = math.sqrt(r_rho * r_rho - 4)
-        t = _m(r_theta + math.atan2(2, u))
-        yield ("L", t), ("S", u), ("R", _m(t - turn))
+    u = np.sqrt(r_rho * r_rho - 4)
+    t = _wrapped(r_theta + np.arctan2(2, u))
+    yield t, u, _wrapped(t - turn)
     # L+ R- L, and L+ R+ L by way of the other solution
-    if l_rho <= 4:
-        u = -2 * math.asin(l_rho / 4)
-        t = _m(l_theta + u / 2 + math.pi)
-        yield ("L", t), ("R", u), ("L", _m(turn - t + u))
+    u = -2 * np.arcsin(l_rho / 4)
+    t = _wrapped(l_theta + u / 2 + math.pi)
+    yield t, u, _wrapped(turn - t + u)
     # L+ R+ L- R-
-    rho = (2 + r_rho) / 4
-    if rho <= 1:
-        u = math.acos(rho)
-        t, v = _tau_omega(u, -u, rx, ry, turn)
-        yield ("L", t), ("R", u), ("L", -u), ("R", v)
+    u = np.arccos((2 + r_rho) / 4)
+    t, v = _tau_omega(u, -u, rx, ry, turn)
+    yield t, u, -u, v
     # L+ R- L- R+
     rho = (20 - r_rho * r_rho) / 16
-    if 0 <= rho <= 1:
-        u = -math.acos(rho)
-        t, v = _tau_omega(u, u, rx, ry, turn)
-        yield ("L", t), ("R", u), ("L", u), ("R", v)
+    u = -np.arccos(np.where(rho >= 0, rho, np.nan))
+    t, v = _tau_omega(u, u, rx, ry, turn)
+    yield t, u, u, v
     # L+ R- S- L-
-    if l_rho >= 2:
-        r = math.sqrt(l_rho * l_rho - 4)
-        t = _m(l_theta + math.atan2(r, -2))
-        yield ("L", t), ("R", -math.pi / 2), ("S", 2 - r), ("L", _m(turn - math.pi / 2 - t))
-    if r_rho >= 2:
-        # L+ R- S- R-
-        t = math.atan2(rx, -ry)
-        yield ("L", t), ("R", -math.pi / 2), ("S", 2 - r_rho), ("R", _m(t + math.pi / 2 - turn))
-        # L+ R- S- L- R+
-        u = 4 - math.sqrt(r_rho * r_rho - 4)
-        if u <= 0:
-            t = _m(math.atan2((4 - u) * rx - 2 * ry, -2 * rx + (u - 4) * ry))
-            half = -math.pi / 2
-            yield ("L", t), ("R", half), ("S", u), ("L", half), ("R", _m(t - turn))
+    r = np.sqrt(l_rho * l_rho - 4)
+    t = _wrapped(l_theta + np.arctan2(r, -2))
+    yield t, half, 2 - r, _wrapped(turn - math.pi / 2 - t)
+    # L+ R- S- R-
+    t = np.where(r_rho >= 2, np.arctan2(rx, -ry), np.nan)
+    yield t, half, 2 - r_rho, _wrapped(t + math.pi / 2 - turn)
+    # L+ R- S- L- R+
+    u = 4 - np.sqrt(r_rho * r_rho - 4)
+    u = np.where(u <= 0, u, np.nan)
+    t = _wrapped(np.arctan2((4 - u) * rx - 2 * ry, -2 * rx + (u - 4) * ry))
+    yield t, half, u, half, _wrapped(t - turn)
 
 
-def _tau_omega(u: float, v: float, x: float, y: float, turn: float) -> tuple[float, float]:
-    delta = _m(u - v)
-    a, b = math.sin(u) - math.sin(delta), math.cos(u) - math.cos(delta) - 1
-    t1 = math.atan2(y * a - x * b, x * a + y * b)
-    t2 = 2 * (math.cos(delta) - math.cos(v) - math.cos(u)) + 3
-    tau = _m(t1 + math.pi) if t2 < 0 else _m(t1)
-    return tau, _m(tau - u + v - turn)
+def _tau_omega(u: Array, v: Array, x: Array, y: Array, turn: Array) -> tuple[Array, Array]:
+    delta = _wrapped(u - v)
+    a, b = np.sin(u) - np.sin(delta), np.cos(u) - np.cos(delta) - 1
+    t1 = np.arctan2(y * a - x * b, x * a + y * b)
+    t2 = 2 * (np.cos(delta) - np.cos(v) - np.cos(u)) + 3
+    tau = np.where(t2 < 0, _wrapped(t1 + math.pi), _wrapped(t1))
+    return tau, _wrapped(tau - u + v - turn)
 
 
-def _m(angle: float) -> float:
-    return wrap_angle(angle)
+def _wrapped(angle: Array) -> Array:
+    """Angles between -pi and pi."""
+    return np.asarray((angle + math.pi) % math.tau - math.pi)

@@ -23,7 +23,7 @@ from polepilot.core.planning.curves import (
     curve_length,
     joined,
     sample,
-    shortest_curves,
+    shortest_curves_each,
 )
 from polepilot.core.planning.space import FreeSpace
 from polepilot.core.planning.track import PLAIN, Track
@@ -192,14 +192,19 @@ class Driver:
         pose = self.track.pose
         goal = Pose2D(*place, heading)
         found: list[tuple[float, Curve]] = []
+        between: list[tuple[Pose2D, Pose2D]] = []
+        beyond: list[tuple[float, float]] = []
         backs = [0.0, *(b for b in (0.5 * self._radius, self._radius) if b <= self.track.straight)]
         for back in backs:
             here = Pose2D(*pose.ahead(-back), pose.heading)
             for ahead in (share * self._radius for share in _AHEAD):
-                there = Pose2D(*goal.ahead(ahead), heading)
-                for curve in shortest_curves(here, there, self._radius, CHANGE)[:6]:
-                    whole = joined((("S", -back), *curve, ("S", -ahead)))
-                    found.append((curve_cost(whole), whole))
+                between.append((here, Pose2D(*goal.ahead(ahead), heading)))
+                beyond.append((back, ahead))
+        every = shortest_curves_each(between, self._radius, CHANGE)
+        for (back, ahead), curves in zip(beyond, every, strict=True):
+            for curve in curves[:6]:
+                whole = joined((("S", -back), *curve, ("S", -ahead)))
+                found.append((curve_cost(whole), whole))
         found.sort(key=lambda entry: entry[0])
         for cost, curve in found:
             if self._fits(pose, curve):

@@ -21,13 +21,33 @@ from polepilot.core.planning.curves import (
     curve_cost,
     joined,
     sample,
-    shortest_curves,
+    shortest_curves_each,
 )
 
 Points = NDArray[np.float64]
 
 _SHORTEST = 0.004
 """Pieces shorter than this are not driven, metres."""
+
+
+_PLACES: tuple[tuple[float, float, bool, bool], ...] = (
+    *((-share, share, False, False) for share in (0.25, 0.5, 0.75, 1.0)),
+    *(
+        (first, last, True, False)
+        for first, last in ((0, 0), (1, -1), (0.5, -0.5), (0.5, 0), (0, -0.5), (0, -1), (1, 0))
+    ),
+    *(
+        (first, last, True, finish)
+        for first, last in ((-1, 1), (-0.5, 1), (-1, 0.5), (-0.5, 0.5), (-0.25, 0.25), (0, 0.5))
+        for finish in (True, False)
+    ),
+    *(
+        (first, last, True, True)
+        for first, last in ((-0.5, 0), (-1, 0), (-0.5, -0.5), (-1.5, 1.5), (-2, 1), (-2, 2))
+    ),
+)
+"""Where turns begin on the way in and end on the way out, in shares of what an arc needs; whether
+the corner is driven to before that, and whether the robot goes back to it after that."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,26 +110,27 @@ def _left_turns(turn: float, radius: float) -> tuple[Turn, ...]:
     """Ways round a corner of ``turn`` radians to the left, the cheapest first."""
     legs = radius * math.tan(min(abs(turn), math.radians(120)) / 2)
     out = np.array([math.cos(turn), math.sin(turn)])
-    ways: list[Turn] = []
     least = _SHORTEST if abs(turn) * radius > _SHORTEST else 0.0
-
-    def add(first: float, last: float, visit: bool, finish: bool) -> None:
-        """From ``first`` on the way in to ``last`` on the way out, in shares of ``legs``.
-
-        ``visit``: to the corner before that; ``finish``: back to the corner after that.
-        """
-        first, last = first * legs, last * legs
+    ends = [
+        (
+            Pose2D(legs * first, 0.0, 0.0),
+            Pose2D(legs * last * math.cos(turn), legs * last * math.sin(turn), wrap_angle(turn)),
+        )
+        for first, last, _, _ in _PLACES
+    ]
+    ways: list[Turn] = []
+    every = shortest_curves_each(ends, radius, CHANGE)
+    for (share, end, visit, finish), (start, _), curves in zip(_PLACES, ends, every, strict=True):
+        first, last = share * legs, end * legs
         finish = finish or last < 0  # what lies before the corner must be free as well
-        start = Pose2D(first, 0.0, 0.0)
-        end = Pose2D(last * math.cos(turn), last * math.sin(turn), wrap_angle(turn))
-        for curve in shortest_curves(start, end, radius, CHANGE)[:4]:
+        checks: list[Points] = []
+        if not visit and first < 0:
+            checks += [np.array([first * part, 0.0]) for part in (0.0, 0.25, 0.5, 0.75)]
+        if not finish and last > 0:
+            checks += [last * part * out for part in (0.25, 0.5, 0.75)]
+        for curve in curves[:4]:
             if any(abs(length) < least for _, length in curve):
                 continue
-            checks: list[Points] = []
-            if not visit and first < 0:
-                checks += [np.array([first * share, 0.0]) for share in (0.0, 0.25, 0.5, 0.75)]
-            if not finish and last > 0:
-                checks += [last * share * out for share in (0.25, 0.5, 0.75)]
             cut = 0.0
             if checks:
                 driven = sample(start, curve, radius)[0]
@@ -122,14 +143,4 @@ def _left_turns(turn: float, radius: float) -> tuple[Turn, ...]:
             way = Turn(0.0, cut, first, visit, stop, joined(whole), radius)
             cost = curve_cost(way.after(10.0)) - 10.0 - stop + 20 * min(cut, 0.5) ** 2
             ways.append(replace(way, cost=cost))
-
-    for share in (0.25, 0.5, 0.75, 1.0):
-        add(-share, share, visit=False, finish=False)
-    for first, last in ((0, 0), (1, -1), (0.5, -0.5), (0.5, 0), (0, -0.5), (0, -1), (1, 0)):
-        add(first, last, visit=True, finish=False)
-    for first, last in ((-1, 1), (-0.5, 1), (-1, 0.5), (-0.5, 0.5), (-0.25, 0.25), (0, 0.5)):
-        add(first, last, visit=True, finish=True)
-        add(first, last, visit=True, finish=False)
-    for first, last in ((-0.5, 0), (-1, 0), (-0.5, -0.5), (-1.5, 1.5), (-2, 1), (-2, 2)):
-        add(first, last, visit=True, finish=True)
     return tuple(sorted(ways, key=lambda way: way.cost))

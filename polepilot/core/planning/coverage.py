@@ -233,7 +233,7 @@ def _strokes(
         cost = sum(s.line.length + (0.0 if s.closed else extra) for s in strokes)
         if strokes and cost < least:
             best, least = strokes, cost
-        if len(loops) > _MANY:
+        if len(loops) > _MANY or target.area > _LARGE * tool**2:
             break  # on a large map the spacing matters less than the time to think about it
     return best
 

@@ -22,9 +22,11 @@ Points = NDArray[np.float64]
 CHORD = 0.001
 """How exactly arcs of paths are taken, metres."""
 _TILE = 10.0
-"""Side of a tile in tool widths, at most."""
+"""Side of a tile in tool widths, at most; more where the area is kilometres long."""
 _GRID = 1e-6
 """Corners of what is left of a tile lie on a grid so fine that neighbours fit, metres."""
+_MOST_TILES = 1000
+"""So many in a row at most."""
 _POLYGON = 3
 
 
@@ -36,7 +38,9 @@ class Target:
         self.shape = area
         self.tool = tool
         self.area = float(area.area)
-        self._tiles = np.array(_tiles(area, _TILE * tool), dtype=object)
+        x0, y0, x1, y1 = area.bounds
+        side = max(_TILE * tool, (x1 - x0 + y1 - y0) / _MOST_TILES)
+        self._tiles = np.array(_tiles(area, side), dtype=object)
         low, high = np.hsplit(shapely.bounds(self._tiles).reshape(-1, 4), 2)
         grow = tool / 2 + 1e-6
         boxes = shapely.box(*(low - grow).T, *(high + grow).T)

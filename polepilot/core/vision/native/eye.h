@@ -2,7 +2,7 @@
  *
  * One call looks at one picture and keeps nothing; any number of threads may call at the same time.
  * The steps, in their order, are one file each:
- *   search.c   which columns to look at, with
+ *   search.c   which columns to look at (sixteen at once: lanes.h), with
  *     runs.c     the bright runs of a column
  *     match.c    runs with the proportions of a code: near landmarks
  *     comb.c     codes too far for runs, with

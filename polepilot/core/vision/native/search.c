@@ -3,12 +3,11 @@
  * The inner part of a code, from the end of the upper end bar to the begin of the lower one, begins
  * and ends dark and holds bright runs one segment long at odd places. It is looked for by itself:
  * what the end bars touch may be as bright as they are. */
-#include "search.h"
+#include "lanes.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#define BLOCK 16         /* columns that are filled together */
 #define ROWS_APART 3     /* every third row is asked for colour: the farthest end bar is as high */
 #define LINE 64          /* bytes of a cache line */
 #define LEAST_PEAK 30    /* grey levels of colour, somewhere in a column that is looked at */
@@ -21,6 +20,25 @@ typedef struct {
     int faint;              /* rows that have at least a little */
 } extent;
 
+/* Notes what colour a row has in the columns from ``from`` to ``to`` of the survey. */
+static inline void note_colour(const uint8_t *row, const eye_task *task, int y, int from, int to,
+                               extent *extents)
+{
+    for (int c = from; c < to; c++) {
+        int colour = eye_colour(row + 3 * EYE_APART * c, task);
+        if (colour <= EYE_FAINT)
+            continue;
+        extent *e = extents + c;
+        e->faint++;
+        if (colour <= 4 * EYE_FAINTEST)
+            continue;
+        e->first = y < e->first ? y : e->first;
+        e->last = y;
+        e->count++;
+        e->strong |= colour > 4 * LEAST_PEAK;
+    }
+}
+
 /* Asks every third row of every second column whether it has colour. */
 static void survey(const eye_picture *p, const eye_task *task, extent *extents)
 {
@@ -31,22 +49,55 @@ static void survey(const eye_picture *p, const eye_task *task, extent *extents)
         extents[c] = coloured ? none : whole;
     for (int y = 0; coloured && y < p->rows; y += ROWS_APART) {
         const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
-        /* Hardware foresees the next cache line, not the next third row. */
-        for (int c = 0; c < columns && y + ROWS_APART < p->rows; c += LINE / (3 * EYE_APART))
-            __builtin_prefetch(row + ROWS_APART * p->stride + 3 * EYE_APART * c);
-        for (int c = 0; c < columns; c++) {
-            int colour = eye_colour(row + 3 * EYE_APART * c, task);
-            if (colour <= EYE_FAINT)
-                continue;
-            extent *e = extents + c;
-            e->faint++;
-            if (colour <= 4 * EYE_FAINTEST)
-                continue;
-            e->first = y < e->first ? y : e->first;
-            e->last = y;
-            e->count++;
-            e->strong |= colour > 4 * LEAST_PEAK;
+        ptrdiff_t ahead = y + ROWS_APART < p->rows ? ROWS_APART * p->stride : 0;
+        int c = 0;
+        for (; 3 * (p->columns - EYE_APART * c) >= EYE_SPAN; c += EYE_LANES) {
+            const uint8_t *at = row + 3 * EYE_APART * c;
+            /* Hardware foresees the next cache line, not the next third row. */
+            __builtin_prefetch(at + ahead);
+            __builtin_prefetch(at + ahead + LINE);
+            eye_lanes high = eye_gather_lanes(at + task->high);
+            eye_lanes low = eye_gather_lanes(at + task->low);
+            if (!eye_are_all(eye_lanes_without(high, low, EYE_FAINT))) /* seldom */
+                note_colour(row, task, y, c, c + EYE_LANES, extents);
         }
+        note_colour(row, task, y, c, columns, extents);
+    }
+}
+
+/* ``eye_signal`` of pixels in the colour of which there is enough. */
+static inline eye_lanes signal_of(const eye_lanes *channels, const eye_task *task)
+{
+    eye_lanes out = {0};
+    for (int odd = 0; odd < 2; odd++) {
+        eye_words light = {0}, high = eye_half_of(channels[task->high], odd);
+        for (int c = 0; c < 3; c++)
+            light += (uint16_t)task->weights[c] * eye_half_of(channels[c], odd);
+        eye_words colour = (6 * high - 7 * eye_half_of(channels[task->low], odd)) >> 2;
+        eye_signs value = (eye_signs)(3 * (light >> 4) >> 5);
+        value = eye_lesser(value, (eye_signs)colour) - EYE_FAINTEST;
+        value = eye_lesser(value & (value > 0), (eye_signs){0} + 255);
+        out |= (eye_lanes)((eye_words)value << 8 * odd);
+    }
+    return out;
+}
+
+/* What `fill` does, for EYE_LANES columns of a picture with colour, and for paint that has some. */
+static void fill_lanes(const eye_picture *p, const eye_task *task, int first, int top, int bottom,
+                       uint8_t *signal)
+{
+    for (int y = top; y <= bottom; y++) {
+        const uint8_t *at = p->pixels + (ptrdiff_t)y * p->stride + (ptrdiff_t)first * EYE_APART * 3;
+        eye_lanes channels[3];
+        for (int c = 0; c < 3; c++)
+            channels[c] = eye_gather_lanes(at + c);
+        eye_lanes without =
+            eye_lanes_without(channels[task->high], channels[task->low], 4 * EYE_FAINTEST);
+        if (eye_are_all(without))
+            continue;
+        eye_lanes out = signal_of(channels, task) & ~without;
+        for (int lane = 0; lane < EYE_LANES; lane++)
+            signal[(ptrdiff_t)eye_lane_column[lane] * p->rows + y] = out[lane];
     }
 }
 
@@ -56,7 +107,11 @@ static void fill(const eye_picture *p, const eye_task *task, int first, int coun
                  int bottom, uint8_t *signal)
 {
     int n = p->channels, coloured = eye_is_coloured(n, task);
-    memset(signal, 0, (size_t)p->rows * (size_t)count);
+    memset(signal, 0, (size_t)p->rows * EYE_LANES);
+    if (coloured && 3 * (p->columns - EYE_APART * first) >= EYE_SPAN) {
+        fill_lanes(p, task, first, top, bottom, signal);
+        return;
+    }
     for (int y = top; y <= bottom; y++) {
         const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride + (ptrdiff_t)first * EYE_APART * n;
         for (int c = 0; c < count; c++) {
@@ -100,7 +155,7 @@ static void look_at_all(eye_hits *hits, const extent *extents, uint8_t *signal)
     int columns = (p->columns + EYE_APART - 1) / EYE_APART;
     for (int c = 0; c < columns;) {
         int first = c, top = p->rows, bottom = -1;
-        for (; c < columns && c - first < BLOCK && extents[c].strong &&
+        for (; c < columns && c - first < EYE_LANES && extents[c].strong &&
                extents[c].count >= LEAST_COLOURED;
              c++) {
             top = extents[c].first < top ? extents[c].first : top;
@@ -133,7 +188,7 @@ int eye_search(const eye_picture *picture, const eye_task *task, eye_candidate *
     int n = -1;
     eye_hits *hits = malloc(sizeof *hits);
     extent *extents = malloc(sizeof *extents * columns);
-    uint8_t *signal = malloc((size_t)picture->rows * BLOCK);
+    uint8_t *signal = malloc((size_t)picture->rows * EYE_LANES);
     if (hits && extents && signal) {
         hits->picture = picture;
         hits->task = task;

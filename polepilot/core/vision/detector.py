@@ -86,9 +86,13 @@ class LandmarkDetector:
 
     def detect(self, image: Image) -> list[Detection]:
         """All landmarks of a picture (rows x columns x 3 BGR, or grey), from left to right."""
-        read = [self._reading(strip) for strip in self._kernel.look(image) if not strip.reason]
-        best = _best([one for one in read if self._stands(one)])
-        return [found.detection for found in self._measured(best)]
+        standing = []
+        for strip in self._kernel.look(image):
+            if not strip.reason:
+                one = self._reading(strip)
+                if self._stands(one):
+                    standing.append(one)
+        return self._measured(_best(standing))
 
     def examine(self, image: Image) -> Look:
         """The same landmarks with their strips, and what else was looked at closely."""
@@ -109,7 +113,8 @@ class LandmarkDetector:
                 rival = any(_same_place(one, other) for other in best)
                 rejected.append(Rejected(one.seen, RIVAL if rival else TWICE))
         rejected.sort(key=lambda one: one.strip.column)
-        return Look(tuple(self._measured(best)), tuple(rejected))
+        found = map(Found, self._measured(best), (one.seen for one in best))
+        return Look(tuple(found), tuple(rejected))
 
     def _reading(self, strip: Strip) -> _Reading:
         kind = self._kinds[strip.id]
@@ -120,25 +125,26 @@ class LandmarkDetector:
         cut = is_cut(one.seen, one.kind, self._camera)
         return stands(one.ideal, one.kind, self._camera, cut)
 
-    def _measured(self, best: Sequence[_Reading]) -> list[Found]:
+    def _measured(self, best: Sequence[_Reading]) -> list[Detection]:
         if not best:
             return []
-        pitch = pitch_of([(one.ideal, one.kind) for one in best], self._camera)
-        found = [
-            Found(measure(one.ideal, one.kind, pitch, self._camera, one.seen), one.seen)
-            for one in best
-        ]
-        return sorted(found, key=lambda one: one.detection.column)
+        camera = self._camera
+        pitch = pitch_of([(one.ideal, one.kind) for one in best], camera)
+        return [measure(one.ideal, one.kind, pitch, camera, one.seen) for one in best]
 
 
 def _best(readings: list[_Reading]) -> list[_Reading]:
-    """One per id and place: of rivals, the one that fits best."""
+    """One per id and place, of rivals the one that fits best; from left to right."""
     if len(readings) < 2:
         return readings
     kept: list[_Reading] = []
     for one in sorted(readings, key=lambda reading: reading.seen.noise):
-        if not any(one.seen.id == other.seen.id or _same_place(one, other) for other in kept):
+        for other in kept:
+            if one.seen.id == other.seen.id or _same_place(one, other):
+                break
+        else:
             kept.append(one)
+    kept.sort(key=lambda reading: reading.seen.column)
     return kept
 
 

@@ -134,6 +134,9 @@ class Strip(ctypes.Structure):
     ]
 
 
+_Strips = Strip * MOST_STRIPS
+
+
 class Kernel:
     """Looks for one set of landmarks with one camera constant; keeps nothing between pictures.
 
@@ -179,21 +182,19 @@ class Kernel:
             InternalError: not such a picture.
             MemoryError: there is no memory for the search.
         """
-        if image.dtype != np.uint8 or image.ndim not in (2, 3) or image.shape[2:] not in _SHAPES:
+        shape = image.shape
+        if image.dtype != np.uint8 or len(shape) not in (2, 3) or shape[2:] not in _SHAPES:
             raise InternalError(
-                f"a picture of {image.dtype}, {image.shape}: expected uint8, rows x columns x 3, "
+                f"a picture of {image.dtype}, {shape}: expected uint8, rows x columns x 3, "
                 "or rows x columns."
             )
-        if image.strides[-1] != 1 or (image.ndim == 3 and image.strides[1] != image.shape[2]):
+        channels = shape[2] if len(shape) == 3 else 1
+        strides = image.strides
+        if strides[-1] != 1 or strides[1] != channels:
             image = np.ascontiguousarray(image)
-        picture = _Picture(
-            image.ctypes.data,
-            image.shape[0],
-            image.shape[1],
-            image.shape[2] if image.ndim == 3 else 1,
-            image.strides[0],
-        )
-        strips = (Strip * MOST_STRIPS)()
+            strides = image.strides
+        picture = _Picture(image.ctypes.data, shape[0], shape[1], channels, strides[0])
+        strips = _Strips()
         count = self._look(ctypes.byref(picture), self._task_at, strips, MOST_STRIPS)
         if count < 0:
             raise MemoryError("no memory to look at a picture")

@@ -97,15 +97,16 @@ def pitch_of(strips: Sequence[tuple[Strip, LandmarkKind]], camera: Camera) -> Pi
     """
     weight = 1 / PITCH_PRIOR**2
     total = 0.0
+    constant = camera.constant
     for strip, kind in strips:
         # sag = -segment sin(pitch) / depth, and depth = C segment / unit.
-        by_pixels = camera.constant / strip.unit
+        by_pixels = constant / strip.unit
         sigma = math.hypot(strip.sag_sigma * by_pixels, TILT)
         if sigma < 10 * PITCH_PRIOR:
             total += -strip.sag * by_pixels / sigma**2
             weight += 1 / sigma**2
         depth = by_pixels * kind.segment
-        seen = math.atan2(camera.center_y - strip.row, camera.constant)
+        seen = math.atan2(camera.center_y - strip.row, constant)
         standing = math.atan2(kind.height / 2 - camera.mount_height, depth)
         if abs(standing - seen) < MOST_PITCH:
             sigma = math.hypot(FOOT_SIGMA / depth, 0.002)
@@ -117,9 +118,8 @@ def pitch_of(strips: Sequence[tuple[Strip, LandmarkKind]], camera: Camera) -> Pi
 def is_cut(strip: Strip, kind: LandmarkKind, camera: Camera) -> bool:
     """Whether more than half of an end bar lies above or below the picture."""
     inner = kind.segments / 2 - 1
-    top = strip.row - strip.unit * inner / (1 - strip.sag * inner)
-    bottom = strip.row + strip.unit * inner / (1 + strip.sag * inner)
-    return top < -0.5 or bottom > camera.height - 0.5
+    row, reach, bend = strip.row, strip.unit * inner, strip.sag * inner
+    return row - reach / (1 - bend) < -0.5 or row + reach / (1 + bend) > camera.height - 0.5
 
 
 def stands(strip: Strip, kind: LandmarkKind, camera: Camera, cut: bool = False) -> bool:
@@ -132,8 +132,9 @@ def stands(strip: Strip, kind: LandmarkKind, camera: Camera, cut: bool = False) 
     seen = math.atan2(camera.center_y - strip.row, camera.constant)
     lowest = depth * math.tan(min(seen + LEVEL, 1.5)) + camera.mount_height
     highest = depth * math.tan(max(seen - LEVEL, -1.5)) + camera.mount_height
-    most = kind.height / 2 + 3 * FOOT_SIGMA if cut else HIGHEST + kind.height / 2
-    return lowest > -0.1 * kind.height and highest < most
+    height = kind.height
+    most = height / 2 + 3 * FOOT_SIGMA if cut else HIGHEST + height / 2
+    return lowest > -0.1 * height and highest < most
 
 
 def through_pinhole(strip: Strip, kind: LandmarkKind, camera: Camera) -> Strip:
@@ -191,10 +192,11 @@ def measure(
     """
     # Rolling shutter and roll both lean a strip about the middle row: there it is where the
     # landmark stands at the picture's stamp.
+    constant = camera.constant
     off = camera.center_y - strip.row
     column = strip.column + strip.lean * off
-    bearing = math.atan2((camera.center_x - column) * math.cos(pitch.angle), camera.constant)
-    rise = off / camera.constant
+    bearing = math.atan2((camera.center_x - column) * math.cos(pitch.angle), constant)
+    rise = off / constant
     elevation = math.tan(math.atan(rise) + pitch.angle)
     longer = (1 + rise * rise) / (1 + elevation * elevation)
     distance = range_of(strip.unit / longer, bearing, kind, camera, strip.front)
@@ -202,17 +204,18 @@ def measure(
         UNIT_FACTOR * strip.unit_sigma, RANGE_FLOOR, 2 * elevation * pitch.sigma, pitch.sigma**2
     )
     sigma = math.hypot(COLUMN_FACTOR * strip.column_sigma, COLUMN_FLOOR, LEAN_SIGMA * off)
-    half = kind.segments / 2
     shown = seen or strip
+    half = kind.segments / 2
+    row, reach, bend = shown.row, shown.unit * half, shown.sag * half
     return Detection(
         id=strip.id,
         range=distance,
         bearing=bearing,
         column=shown.column,
-        top=shown.row - shown.unit * half / (1 - shown.sag * half),
-        bottom=shown.row + shown.unit * half / (1 + shown.sag * half),
+        top=row - reach / (1 - bend),
+        bottom=row + reach / (1 + bend),
         range_sigma=relative * distance,
-        bearing_sigma=sigma * math.cos(bearing) ** 2 / camera.constant,
+        bearing_sigma=sigma * math.cos(bearing) ** 2 / constant,
     )
 
 

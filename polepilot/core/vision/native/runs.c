@@ -14,6 +14,19 @@ typedef struct {
     int level, at;
 } extremum;
 
+/* From row ``y`` on past rows of nothing, eight at a time: most of a column is nothing. */
+static inline int pass_nothing(const uint8_t *s, int y, int to)
+{
+    uint64_t eight = 0;
+    if (to > y)
+        while (y + 8 <= to && (memcpy(&eight, s + y, 8), eight == 0))
+            y += 8;
+    else
+        while (y - 8 >= to && (memcpy(&eight, s + y - 7, 8), eight == 0))
+            y -= 8;
+    return y;
+}
+
 /* Where a run's edge lies: from the dark row at ``from`` (level ``valley``) towards ``to``.
  *
  * The edge ends at a shoulder, not at the peak: behind a bar something brighter may go on. */
@@ -21,6 +34,7 @@ static float edge(const uint8_t *s, int from, int to, int valley, int peak)
 {
     int step = to > from ? 1 : -1, y = from;
     int low = valley + (int)(LEAVES_DARK * (peak - valley));
+    y = pass_nothing(s, y, to);
     while (y != to && s[y] <= low)
         y += step;
     int top = y;
@@ -49,9 +63,7 @@ static int pass_dark(const uint8_t *s, int rows, int y, int rise, extremum *vall
     int level = valley->level, at = valley->at;
     for (; y < rows; y++) {
         if (s[y] == 0) {
-            uint64_t eight = 0; /* most of a column is nothing */
-            while (y + 8 <= rows && (memcpy(&eight, s + y, 8), eight == 0))
-                y += 8;
+            y = pass_nothing(s, y, rows);
             level = 0;
             at = y > 0 ? y - 1 : 0;
             if (y >= rows)
@@ -88,7 +100,7 @@ static int pass_bright(const uint8_t *s, int rows, int y, int least, extremum *p
 int eye_find_runs(const uint8_t *s, int rows, eye_run *runs)
 {
     extremum peaks[EYE_MOST_RUNS], valleys[EYE_MOST_RUNS + 1], valley = {0, 0};
-    int brightest = 0;
+    uint8_t brightest = 0; /* a byte: many at a time */
     for (int y = 0; y < rows; y++)
         brightest = s[y] > brightest ? s[y] : brightest;
     int least = brightest / 10 > EYE_LEAST_STEP ? brightest / 10 : EYE_LEAST_STEP;

@@ -41,17 +41,38 @@ typedef struct {
     double normal[EYE_PARAMETERS * EYE_PARAMETERS], right[EYE_PARAMETERS];
 } equations;
 
-/* Adds a row to the normal equations; most of its entries are nought. */
-static void add_row(double *normal, double *right, const double *row, double rest, double weight)
+/* Two numbers at a time. */
+typedef double pair __attribute__((vector_size(2 * sizeof(double))));
+
+/* Adds one entry's products with ``n`` entries, an even number, to its line of the equations. */
+static inline void add_line(double *line, const double *row, double scaled, int n)
 {
-    for (int a = 0; a < EYE_PARAMETERS; a++) {
+    for (int b = 0; b < n; b += 2) {
+        pair sum, entry;
+        memcpy(&sum, line + b, sizeof sum);
+        memcpy(&entry, row + b, sizeof entry);
+        sum += scaled * entry;
+        memcpy(line + b, &sum, sizeof sum);
+    }
+}
+
+/* Adds a row to the normal equations; most of its entries are nought, all but the levels' where no
+ * boundary shows. Beyond the diagonal it leaves what `mirror` overwrites. */
+static void add_row(double *normal, double *right, const double *row, int shows, double rest,
+                    double weight)
+{
+    enum { FEW = (EYE_LINEAR + 1) / 2 * 2 };
+    for (int a = 0; a < EYE_LINEAR; a++) {
         if (row[a] == 0)
             continue;
         double scaled = row[a] * weight;
-        double *line = normal + a * EYE_PARAMETERS;
         right[a] += scaled * rest;
-        for (int b = 0; b <= a; b++)
-            line[b] += scaled * row[b];
+        add_line(normal + a * EYE_PARAMETERS, row, scaled, FEW);
+    }
+    for (int a = EYE_LINEAR; shows && a < EYE_PARAMETERS; a++) {
+        double scaled = row[a] * weight;
+        right[a] += scaled * rest;
+        add_line(normal + a * EYE_PARAMETERS, row, scaled, EYE_PARAMETERS);
     }
 }
 
@@ -138,7 +159,7 @@ static void compare(const eye_upright *u, const profile *seen, const eye_wave *w
                                                     seen->beside[i], row);
         /* Photon noise: the variance of light grows with the light. */
         double weight = 1 / (fabs(seen->light[i]) + DARK_NOISE);
-        add_row(out->normal, out->right, row, rest, weight);
+        add_row(out->normal, out->right, row, at.shows, rest, weight);
         weighted += rest * rest * weight;
         plain += rest * rest;
         out->rests[i - from] = rest * sqrt(weight);

@@ -46,23 +46,39 @@ typedef struct {
     double plain, variance; /* of what is left over: mean square at the better side, variance */
 } equations;
 
+/* The strips of the surface: where each lies, from -1 to 1, and how high, 0 to 1. */
+typedef struct {
+    int cells;
+    double place[MOST_CELLS], rise[MOST_CELLS];
+} surface;
+
+static void divide(surface *out, int cells)
+{
+    out->cells = cells;
+    for (int i = 0; i < cells; i++) {
+        double u = (2 * i + 1.0) / cells - 1;
+        out->place[i] = u;
+        out->rise[i] = sqrt(1 - u * u);
+    }
+}
+
 /* One column of the model: basis of the levels and derivatives; returns the prediction. */
-static double model_column(double x, double size, const double *guess, int cells, int flat,
+static double model_column(double x, double size, const double *guess, const surface *of, int flat,
                            double *row)
 {
+    int cells = of->cells;
     double middle = guess[MIDDLE], sharp = 1 / guess[BLUR], half = guess[HALF];
     double weight = 2 * half / (cells * size);
     memset(row, 0, sizeof(double) * PARAMETERS);
     double by_middle = 0, by_blur = 0, by_half = 0, sum = 0;
     for (int i = 0; i < cells; i++) {
-        double u = (2 * i + 1.0) / cells - 1;
-        double place = middle + half * u;
+        double u = of->place[i], place = middle + half * u;
         double z0 = (x - size / 2 - place) * sharp, z1 = (x + size / 2 - place) * sharp;
         if (z1 < -SHOWS || z0 > SHOWS)
             continue;
         double b0 = eye_bell(z0), b1 = eye_bell(z1);
         double kernel = (eye_cumulative(z1) - eye_cumulative(z0)) * weight;
-        double rise = sqrt(1 - u * u);
+        double rise = of->rise[i];
         double level = guess[LEVEL] + guess[SLOPE] * u + (flat ? 0 : guess[BULGE] * rise);
         double by_place = (b0 - b1) * weight * sharp;
         row[LEVEL] += kernel;
@@ -148,16 +164,16 @@ static double on_and_beside(const double *zone, const int *size)
 
 /* Compares the columns with the model: the normal equations. Priors: the width is known from the
  * range, and light does not run wild over the surface. */
-static void compare(const eye_upright *u, const double *guess, double half, double peak, int flat,
-                    int from, int to, equations *out)
+static void compare(const eye_upright *u, const surface *of, const double *guess, double half,
+                    double peak, int flat, int from, int to, equations *out)
 {
     double row[PARAMETERS], zone[3] = {0};
-    int size[3] = {0}, cells = eye_clamp((int)(1.5 * half), FEWEST_CELLS, MOST_CELLS);
+    int size[3] = {0};
     memset(out->normal, 0, sizeof out->normal);
     memset(out->right, 0, sizeof out->right);
     for (int i = from; i < to; i++) {
         double x = u->across_first + i * u->step;
-        double rest = u->across[i] - model_column(x, u->step, guess, cells, flat, row);
+        double rest = u->across[i] - model_column(x, u->step, guess, of, flat, row);
         int at = x < guess[MIDDLE] - guess[HALF] ? 0 : x > guess[MIDDLE] + guess[HALF] ? 2 : 1;
         zone[at] += rest * rest;
         size[at]++;
@@ -203,6 +219,7 @@ static double move(const equations *sums, double half, double *guess)
 int eye_fit_side(const eye_picture *p, const eye_upright *u, double half, int flat, eye_side *out)
 {
     equations sums;
+    surface cells;
     double peak = 0;
     int from, to;
     if (!choose_columns(p, u, half, &from, &to))
@@ -221,8 +238,9 @@ int eye_fit_side(const eye_picture *p, const eye_upright *u, double half, int fl
         [HALF] = half,
     };
     double astray = half + 2 + (cut ? half : 0);
+    divide(&cells, eye_clamp((int)(1.5 * half), FEWEST_CELLS, MOST_CELLS));
     for (int round = 0; round < ROUNDS; round++) {
-        compare(u, guess, half, peak, flat, from, to, &sums);
+        compare(u, &cells, guess, half, peak, flat, from, to, &sums);
         double moved = move(&sums, half, guess);
         if (isnan(moved))
             return EYE_NO_CONTRAST;

@@ -43,10 +43,10 @@ double eye_row_of(const double *guess, double place)
 }
 
 /* A step at ``place`` as the rows between two borders see it: the mean of the normal distribution's
- * cumulative function over them, and how that changes. */
-static inline slope step_at(double upper, double lower, double place, double blur)
+ * cumulative function over them, and how that changes. ``sharp``: 1 / blur. */
+static inline slope step_at(double upper, double lower, double place, double blur, double sharp)
 {
-    double sharp = 1 / blur, size = 1 / (lower - upper);
+    double size = 1 / (lower - upper);
     double z0 = (upper - place) * sharp, z1 = (lower - place) * sharp;
     if (z1 < -SHOWS)
         return (slope){0, 0, 0};
@@ -66,6 +66,7 @@ void eye_lay_out(const eye_wave *wave, const double *guess, eye_layout *out)
         out->squeeze[k] = 1 / (1 + guess[EYE_SAG] * wave->place[k]);
     }
     out->reach = SHOWS * guess[EYE_BLUR];
+    out->sharp = 1 / guess[EYE_BLUR];
     out->passed = 0;
 }
 
@@ -87,9 +88,10 @@ double eye_wave_row(const eye_wave *wave, eye_layout *at, const double *guess, d
     shift = eye_limit(shift, -MOST_SHIFT, MOST_SHIFT);
     double light = guess[EYE_BRIGHT] + guess[EYE_BRIGHT_TILT] * shift;
     double shade = guess[EYE_DARK] + guess[EYE_DARK_TILT] * shift;
-    for (int k = passed; k <= last_edge && at->place[k] < lower + at->reach; k++) {
+    int k = passed;
+    for (; k <= last_edge && at->place[k] < lower + at->reach; k++) {
         double q = wave->place[k], sign = wave->sign[k];
-        slope s = step_at(upper, lower, at->place[k], guess[EYE_BLUR]);
+        slope s = step_at(upper, lower, at->place[k], guess[EYE_BLUR], at->sharp);
         bright += sign * s.step;
         double jump = sign * (light - shade);
         if (k == 0) {
@@ -106,6 +108,7 @@ double eye_wave_row(const eye_wave *wave, eye_layout *at, const double *guess, d
         by_growth -= move * sign;
         by_blur += jump * s.by_blur;
     }
+    at->shows = k - passed;
     double dark = first - last - bright;
     row[EYE_ABOVE] = 1 - first;
     row[EYE_BRIGHT] = bright;
@@ -186,7 +189,7 @@ int eye_segment_levels(const eye_upright *u, const eye_scale *scale, const char 
     for (int k = 0; k <= segments; k++)
         place[k] = eye_row_of(guess, k - half);
     int passed = 0;
-    double reach = SHOWS * scale->blur;
+    double reach = SHOWS * scale->blur, sharp = 1 / scale->blur;
     for (int i = 0; i < u->rows; i++) {
         double upper = u->first + i * u->bin, lower = upper + u->bin;
         if (lower < place[0] - scale->unit || upper > place[segments] + scale->unit)
@@ -197,7 +200,7 @@ int eye_segment_levels(const eye_upright *u, const eye_scale *scale, const char 
         double share[MOST], before = 1;
         int last = passed;
         for (int k = passed; k <= segments && place[k] < lower + reach; k++) {
-            double step = step_at(upper, lower, place[k], scale->blur).step;
+            double step = step_at(upper, lower, place[k], scale->blur, sharp).step;
             share[k] = before - step;
             before = step;
             last = k + 1;
@@ -209,7 +212,7 @@ int eye_segment_levels(const eye_upright *u, const eye_scale *scale, const char 
                 sums[c] += share[a] * u->channel[i][c];
             sums[EYE_LIGHT] += share[a] * u->light[i];
             for (int b = passed; b <= a; b++)
-                matrix[a * n + b] += share[a] * share[b];
+                matrix[b * n + a] += share[a] * share[b];
         }
     }
     for (int a = 0; a < n; a++)

@@ -36,7 +36,9 @@ typedef struct {
 typedef struct {
     double place[EYE_MOST_EDGES], squeeze[EYE_MOST_EDGES];
     double reach; /* rows on either side of a boundary in which it shows */
-    int passed;   /* boundaries above the last row that no longer showed in it */
+    double sharp; /* 1 / blur */
+    int passed;   /* boundaries above the last row that no longer showed in it, */
+    int shows;    /* and how many did */
 } eye_layout;
 
 double eye_row_of(const double *guess, double place);

@@ -101,6 +101,15 @@ static inline int eye_clamp(int value, int low, int high)
     return value < low ? low : value > high ? high : value;
 }
 
+/* As floor and ceil, which are slow on a plain x86-64; of numbers that an int can hold. */
+static inline int eye_floor(double value)
+{
+    int whole = (int)value;
+    return whole - (whole > value);
+}
+
+static inline int eye_ceil(double value) { return -eye_floor(-value); }
+
 static inline double eye_limit(double value, double low, double high)
 {
     return value < low ? low : value > high ? high : value;

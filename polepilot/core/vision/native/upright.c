@@ -43,6 +43,24 @@ static inline float light_of(const uint8_t *pixel, int channels, const eye_task 
     return eye_linear_sixteenths(eye_brightness(pixel, channels, task));
 }
 
+/* Adds one row of the picture to a band, ``step`` of its columns to each, as `fill_band` does: what
+ * nearly always is asked, so it has a loop of its own. */
+static __attribute__((noinline)) void add_colour(const uint8_t *row, int last, const eye_task *task,
+                                                 int first, int step, int columns, band *out)
+{
+    for (int c = 0, x = first; c < columns; c++) {
+        float light = out->light[c], signal = out->signal[c];
+        for (int end = x + step; x < end; x++) {
+            const uint8_t *pixel = row + 3 * (ptrdiff_t)eye_clamp(x, 0, last);
+            light += eye_linear(pixel[task->high]) - eye_linear(pixel[task->low]);
+            if (eye_colour(pixel, task) > 4 * EYE_FAINTEST) /* else it is nothing */
+                signal += (float)eye_signal(pixel, 3, task);
+        }
+        out->light[c] = light;
+        out->signal[c] = signal;
+    }
+}
+
 /* Light and signal of one band by column, between two rows: the mean of up to ROWS_A_BAND of them,
  * and of ``step`` columns of the picture. */
 static void fill_band(const eye_picture *p, const eye_task *task, double from, double to,
@@ -61,6 +79,10 @@ static void fill_band(const eye_picture *p, const eye_task *task, double from, d
         int y = top + (2 * i + 1) * count / (2 * used);
         const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
         middle += y;
+        if (!sharp && eye_is_coloured(p->channels, task)) {
+            add_colour(row, p->columns - 1, task, first, step, columns, out);
+            continue;
+        }
         for (int k = 0; k < columns * step; k++) {
             int x = eye_clamp(first + k, 0, p->columns - 1), c = k / step;
             const uint8_t *pixel = row + x * p->channels;
@@ -113,7 +135,7 @@ static void difference(const band *bands, int n, int columns, int step, double r
     memset(out, 0, sizeof *out * (size_t)columns);
     for (int b = 0; b < n; b++) {
         double shift = lean * (bands[b].row - row) / step;
-        int whole = (int)floor(shift);
+        int whole = eye_floor(shift);
         float part = (float)(shift - whole), weight = (float)bands[b].weight;
         float near = weight * (1 - part), far = weight * part;
         const float *of = light ? bands[b].light : bands[b].signal;
@@ -234,7 +256,7 @@ static void fill_beside(const eye_picture *p, const eye_task *task, int y, const
     memset(beside, 0, 4 * sizeof *beside);
     for (int k = 0; k < 4; k++) {
         double x = middle + (k < 2 ? -1 : 1) * (away + k % 2);
-        const uint8_t *pixel = row + eye_clamp((int)floor(x + 0.5), 0, p->columns - 1) * p->channels;
+        const uint8_t *pixel = row + eye_clamp(eye_floor(x + 0.5), 0, p->columns - 1) * p->channels;
         for (int c = 0; c < p->channels; c++)
             beside[c] += eye_linear(pixel[c]) / 4;
         beside[3] += eye_linear_sixteenths(eye_brightness(pixel, p->channels, task)) / 4;
@@ -257,6 +279,7 @@ static void fill_profile(const eye_picture *p, const eye_task *task, double top,
     out->first = first - 0.5;
     out->channels = p->channels;
     double half = out->half_window;
+    int three = p->channels == 3;
     int step = (int)(half / COLUMNS_A_HALF);
     step = step < 1 ? 1 : step;
     for (int r = 0; r < rows; r++) {
@@ -265,8 +288,8 @@ static void fill_profile(const eye_picture *p, const eye_task *task, double top,
             int y = first + r * bin + i;
             const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
             double middle = out->column + out->lean * (y - out->row);
-            int from = eye_clamp((int)ceil(middle - half - 0.5), 0, p->columns - 1);
-            int to = eye_clamp((int)floor(middle + half + 0.5), 0, p->columns - 1);
+            int from = eye_clamp(eye_ceil(middle - half - 0.5), 0, p->columns - 1);
+            int to = eye_clamp(eye_floor(middle + half + 0.5), 0, p->columns - 1);
             for (int x = from; x <= to; x += step) {
                 float share = share_of(x - middle, half);
                 const uint8_t *pixel = row + x * p->channels;
@@ -276,7 +299,7 @@ static void fill_profile(const eye_picture *p, const eye_task *task, double top,
                  * edges are not displaced. */
                 light += share *
                          eye_linear_sixteenths(eye_brightness(pixel, p->channels, task));
-                for (int k = 0; k < p->channels; k++)
+                for (int k = 0; k < (three ? 3 : 1); k++)
                     channel[k] += share * eye_linear(pixel[k]);
             }
         }

@@ -26,17 +26,20 @@
  * part blurred into them: that part of a wall's or floor's pattern is taken off again. */
 static void sum_brightness(const eye_hits *hits, int x, int from, int to, float *sum)
 {
+    enum { COLUMNS = 5 }; /* three, and one on either side */
+    static const int beside[COLUMNS] = {-1, 0, 1, -APART, APART};
     const eye_picture *p = hits->picture;
-    int n = p->channels, last = p->columns - 1;
+    ptrdiff_t at[COLUMNS];
+    for (int k = 0; k < COLUMNS; k++)
+        at[k] = 3 * (ptrdiff_t)eye_clamp(x + beside[k], 0, p->columns - 1);
     sum[0] = 0;
     for (int y = from; y < to; y++) {
         const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
-        int total = 0, beside = 0;
-        for (int side = -1; side <= 1; side++)
-            total += eye_brightness(row + eye_clamp(x + side, 0, last) * n, n, hits->task);
-        for (int side = -APART; side <= APART; side += 2 * APART)
-            beside += eye_brightness(row + eye_clamp(x + side, 0, last) * n, n, hits->task);
-        sum[y - from + 1] = sum[y - from] + (float)total / 48 - LEAK * (float)beside / 32;
+        int light[COLUMNS];
+        for (int k = 0; k < COLUMNS; k++)
+            light[k] = eye_brightness(row + at[k], 3, hits->task);
+        sum[y - from + 1] = sum[y - from] + (float)(light[0] + light[1] + light[2]) / 48 -
+                            LEAK * (float)(light[3] + light[4]) / 32;
     }
 }
 

@@ -139,8 +139,9 @@ def _best(readings: list[_Reading]) -> list[_Reading]:
         return readings
     kept: list[_Reading] = []
     for one in sorted(readings, key=lambda reading: reading.seen.noise):
+        number = one.seen.id
         for other in kept:
-            if one.seen.id == other.seen.id or _same_place(one, other):
+            if other.seen.id == number or _same_place(one, other):
                 break
         else:
             kept.append(one)
@@ -149,7 +150,8 @@ def _best(readings: list[_Reading]) -> list[_Reading]:
 
 
 def _same_place(one: _Reading, other: _Reading) -> bool:
+    half = one.half
     return (
-        abs(one.seen.column - other.seen.column) <= 0.24 * one.half
-        and abs(one.seen.row - other.seen.row) <= one.half + other.half
+        abs(one.seen.column - other.seen.column) <= 0.24 * half
+        and abs(one.seen.row - other.seen.row) <= half + other.half
     )

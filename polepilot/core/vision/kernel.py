@@ -22,6 +22,7 @@ VERSION = 3
 IDS = 256
 MOST_STRIPS = 24
 _LIBRARY = Path(__file__).with_name("_kernel.so")
+_BYTE = np.dtype(np.uint8)
 _SHAPES = ((), (1,), (3,))
 """Channels of a picture: grey in two ways, and blue-green-red."""
 
@@ -183,7 +184,7 @@ class Kernel:
             MemoryError: there is no memory for the search.
         """
         shape = image.shape
-        if image.dtype != np.uint8 or len(shape) not in (2, 3) or shape[2:] not in _SHAPES:
+        if image.dtype != _BYTE or len(shape) not in (2, 3) or shape[2:] not in _SHAPES:
             raise InternalError(
                 f"a picture of {image.dtype}, {shape}: expected uint8, rows x columns x 3, "
                 "or rows x columns."
@@ -193,12 +194,20 @@ class Kernel:
         if strides[-1] != 1 or strides[1] != channels:
             image = np.ascontiguousarray(image)
             strides = image.strides
-        picture = _Picture(image.ctypes.data, shape[0], shape[1], channels, strides[0])
+        picture = _Picture(_address_of(image), shape[0], shape[1], channels, strides[0])
         strips = _Strips()
         count = self._look(ctypes.byref(picture), self._task_at, strips, MOST_STRIPS)
         if count < 0:
             raise MemoryError("no memory to look at a picture")
         return strips[:count]
+
+
+def _address_of(image: Image) -> int:
+    """Where the first pixel is; nearly always in a third of the time that numpy takes to say so."""
+    try:
+        return ctypes.addressof(ctypes.c_char.from_buffer(image.data))
+    except (TypeError, ValueError):  # not to be written to, empty, or a part of another picture
+        return image.ctypes.data
 
 
 def _library() -> ctypes.CDLL:

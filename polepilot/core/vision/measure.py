@@ -128,11 +128,11 @@ def stands(strip: Strip, kind: LandmarkKind, camera: Camera, cut: bool = False) 
     Far stripes of other things are told from landmarks by this more than by anything else.
     Of one that the picture has ``cut`` less is seen, so it has to stand on the floor.
     """
-    depth = depth_of(kind.segment, strip.unit, camera.constant)
-    seen = math.atan2(camera.center_y - strip.row, camera.constant)
-    lowest = depth * math.tan(min(seen + LEVEL, 1.5)) + camera.mount_height
-    highest = depth * math.tan(max(seen - LEVEL, -1.5)) + camera.mount_height
-    height = kind.height
+    constant, above, height = camera.constant, camera.mount_height, kind.height
+    depth = constant * kind.segment / strip.unit
+    seen = math.atan2(camera.center_y - strip.row, constant)
+    lowest = depth * math.tan(min(seen + LEVEL, 1.5)) + above
+    highest = depth * math.tan(max(seen - LEVEL, -1.5)) + above
     most = height / 2 + 3 * FOOT_SIGMA if cut else HIGHEST + height / 2
     return lowest > -0.1 * height and highest < most
 

@@ -22,6 +22,13 @@
 #define LEAST_DEPTH 9.0f   /* grey levels of a valley */
 #define MOST_SUMS (3 * LONGEST + 32)
 
+/* Puts something behind a running sum: whoever takes four of its numbers at once finds it. */
+static void end_sum(float *last)
+{
+    for (int i = 1; i <= EYE_BEYOND; i++)
+        last[i] = *last;
+}
+
 /* The running sum of the brightness of three columns, grey levels of one. What is beside them is in
  * part blurred into them: that part of a wall's or floor's pattern is taken off again. */
 static void sum_brightness(const eye_hits *hits, int x, int from, int to, float *sum)
@@ -41,6 +48,7 @@ static void sum_brightness(const eye_hits *hits, int x, int from, int to, float 
         sum[y - from + 1] = sum[y - from] + (float)(light[0] + light[1] + light[2]) / 48 -
                             LEAK * (float)(light[3] + light[4]) / 32;
     }
+    end_sum(sum + (to - from));
 }
 
 /* The running sum of the signal of one column. */
@@ -49,6 +57,7 @@ static void sum_signal(const uint8_t *signal, int from, int to, float *sum)
     sum[0] = 0;
     for (int y = from; y < to; y++)
         sum[y - from + 1] = sum[y - from] + (float)signal[y];
+    end_sum(sum + (to - from));
 }
 
 /* Whether the light has two valleys, as every code does. */

@@ -13,6 +13,7 @@
 #define EYE_APART 2        /* every second column is looked at */
 #define EYE_FAINT 32       /* quarters of a grey level of colour; what has less has none */
 #define EYE_BLEEDING 3     /* rows by which colour may go on beyond a code */
+#define EYE_BEYOND 3       /* numbers behind a running sum */
 
 /* A bright stretch of one column's signal. */
 typedef struct {

@@ -1,9 +1,10 @@
 /* Slides codes of all sizes along the light of one column: where does one fit?
  *
- * At whole rows first, many places at once, then finer about the best one. */
+ * At whole rows first, four places at once, then finer about the best one. */
 #include "search.h"
 
 #include <math.h>
+#include <string.h>
 
 #define ROUGH_REST 0.18f /* mean square that a code may leave over at whole rows, of bright - dark, */
 #define MOST_REST 0.12f  /* and at quarters of a row */
@@ -15,6 +16,7 @@
 #define FINE_PLACE 0.5f  /* and so many off its middle */
 #define HOPELESS 1e9f    /* the rest of what is no code at all */
 #define MOST_PLACES 96
+#define FOUR (EYE_BEYOND + 1) /* places that are tried at once */
 
 /* The light of each segment of a code of that place and size, from the running sum over ``rows``;
  * 0 where it goes beyond them. */
@@ -66,98 +68,112 @@ static void compare(const float *sum, int rows, int bits, eye_slid *out)
     out->rest = rest / (step * step * (float)segments);
 }
 
-/* Light between two places of a code, summed up, for codes that begin at row ``low`` and the n - 1
- * rows after it. */
-static void span(const float *sum, int low, int n, float from, float to, float *out)
+/* Four neighbouring rows at once. */
+typedef float quad __attribute__((vector_size(FOUR * sizeof(float))));
+typedef int32_t quad_mask __attribute__((vector_size(FOUR * sizeof(int32_t))));
+
+static inline quad load(const float *at)
 {
-    int first = (int)from, last = (int)to;
-    float share = from - (float)first, rest = to - (float)last;
-    const float *a = sum + low + first, *b = sum + low + last;
-    for (int i = 0; i < n; i++)
-        out[i] = b[i] + rest * (b[i + 1] - b[i]) - a[i] - share * (a[i + 1] - a[i]);
+    quad four;
+    memcpy(&four, at, sizeof four);
+    return four;
+}
+
+/* A place of a code: whole rows from where it begins, and a share of the next one. */
+typedef struct {
+    int row;
+    float share;
+} place;
+
+static inline place place_at(float rows)
+{
+    int row = (int)rows;
+    return (place){row, rows - (float)row};
+}
+
+/* The running sum at a place of codes that begin at four rows: at whole rows, and what is more. */
+static inline quad sum_at(const float *sum, place at) { return load(sum + at.row); }
+
+static inline quad more_at(const float *sum, place at)
+{
+    return at.share * (load(sum + at.row + 1) - load(sum + at.row));
 }
 
 /* Leaves the places at which both end bars are brighter than the fences beside them; returns how
  * many there are from ``low`` on. */
 static int narrow(const float *sum, float segments, float unit, int *low, int n)
 {
-    float bar[MOST_PLACES], fence[MOST_PLACES], upper[MOST_PLACES], lower[MOST_PLACES];
     float least = LEAST_RISE * 2 * unit;
-    span(sum, *low, n, 0, 2 * unit, bar);
-    span(sum, *low, n, 2 * unit, 3 * unit, fence);
-    for (int i = 0; i < n; i++)
-        upper[i] = bar[i] - 2 * fence[i] - least;
-    int first = 0, last = n;
-    while (first < n && upper[first] < 0)
-        first++;
-    if (first == n)
-        return 0;
-    span(sum, *low, n, (segments - 2) * unit, segments * unit, bar);
-    span(sum, *low, n, (segments - 3) * unit, (segments - 2) * unit, fence);
-    for (int i = 0; i < n; i++) {
-        float other = bar[i] - 2 * fence[i] - least;
-        lower[i] = other < upper[i] ? other : upper[i];
+    place bar = place_at(2 * unit), fence = place_at(3 * unit);
+    place other_fence = place_at((segments - 3) * unit), other_bar = place_at((segments - 2) * unit);
+    place end = place_at(segments * unit);
+    int first = n, last = 0;
+    for (int i = 0; i < n; i += FOUR) {
+        const float *from = sum + *low + i;
+        quad at = sum_at(from, bar), more = more_at(from, bar);
+        quad light = at + more - load(from);
+        quad shade = sum_at(from, fence) + more_at(from, fence) - at - more;
+        quad_mask out = light - 2 * shade - least < 0;
+        int32_t is_out[FOUR];
+        memcpy(is_out, &out, sizeof out);
+        if (is_out[0] & is_out[1] & is_out[2] & is_out[3])
+            continue;
+        at = sum_at(from, other_bar);
+        more = more_at(from, other_bar);
+        light = sum_at(from, end) + more_at(from, end) - at - more;
+        shade = at + more - sum_at(from, other_fence) - more_at(from, other_fence);
+        out |= light - 2 * shade - least < 0;
+        memcpy(is_out, &out, sizeof out);
+        for (int k = 0; k < FOUR && i + k < n; k++)
+            if (!is_out[k]) {
+                first = i + k < first ? i + k : first;
+                last = i + k + 1;
+            }
     }
-    while (first < n && lower[first] < 0)
-        first++;
-    while (last > first && lower[last - 1] < 0)
-        last--;
     *low += first;
     return last - first;
 }
 
-/* What `compare` does, for many places at once: the rows from ``low`` on, in loops that a compiler
- * makes vectors of. The better one of bright and dark is taken for every bit. */
+/* What `compare` does, for four places at once, of those from ``low`` on. The better one of bright
+ * and dark is taken for every bit. */
 static void sweep(const float *sum, int bits, float unit, int low, int n, eye_slid *best)
 {
     int segments = 2 * bits + 5;
-    float before[MOST_PLACES], level[EYE_MOST_SEGMENTS][MOST_PLACES];
-    float bright[MOST_PLACES], dark[MOST_PLACES], rest[MOST_PLACES], scale = 1 / unit;
-    for (int i = 0; i < n; i++)
-        before[i] = sum[low + i];
-    for (int k = 0; k < segments; k++) {
-        float place = unit * (float)(k + 1);
-        int at = (int)place;
-        float share = place - (float)at;
-        const float *from = sum + low + at;
-        for (int i = 0; i < n; i++) {
-            float here = from[i] + share * (from[i + 1] - from[i]);
-            level[k][i] = (here - before[i]) * scale;
-            before[i] = here;
+    float scale = 1 / unit;
+    place places[EYE_MOST_SEGMENTS];
+    for (int k = 0; k < segments; k++)
+        places[k] = place_at(unit * (float)(k + 1));
+    for (int i = 0; i < n; i += FOUR) {
+        const float *from = sum + low + i;
+        quad level[EYE_MOST_SEGMENTS], before = load(from), dark = {0}, rest = {0};
+        for (int k = 0; k < segments; k++) {
+            quad here = sum_at(from, places[k]) + more_at(from, places[k]);
+            level[k] = (here - before) * scale;
+            before = here;
         }
-    }
-    for (int i = 0; i < n; i++) {
-        bright[i] = (level[0][i] + level[1][i] + level[segments - 2][i] + level[segments - 1][i]) / 4;
-        dark[i] = rest[i] = 0;
-    }
-    for (int k = 2; k < segments - 2; k += 2)
-        for (int i = 0; i < n; i++)
-            dark[i] += level[k][i] / (float)(bits + 1);
-    for (int k = 0; k < segments; k++) {
-        int bar = k < 2 || k >= segments - 2;
-        if (bar || k % 2 == 0) {
-            const float *wanted = bar ? bright : dark;
-            for (int i = 0; i < n; i++) {
-                float off = level[k][i] - wanted[i];
-                rest[i] += off * off;
-            }
-            continue;
-        }
-        for (int i = 0; i < n; i++) {
-            float off = level[k][i] - dark[i], less = LONE * (bright[i] - dark[i]) - off;
-            less = (less + fabsf(less)) / 2;
+        quad bright = (level[0] + level[1] + level[segments - 2] + level[segments - 1]) / 4;
+        for (int k = 2; k < segments - 2; k += 2)
+            dark += level[k] / (float)(bits + 1);
+        quad step = bright - dark, lone = LONE * step;
+        for (int k = 0; k < segments; k++) {
+            int bar = k < 2 || k >= segments - 2;
+            quad off = level[k] - (bar ? bright : dark), less = lone - off;
             off *= off;
-            less *= less;
-            rest[i] += off < less ? off : less;
+            if (!bar && k % 2 == 1) {
+                less = (quad)((quad_mask)less & (less > 0));
+                less *= less;
+                quad_mask nearer = off < less;
+                off = (quad)(((quad_mask)off & nearer) | ((quad_mask)less & ~nearer));
+            }
+            rest += off;
         }
-    }
-    for (int i = 0; i < n; i++) {
-        float step = bright[i] - dark[i], size = step * step * (float)segments;
-        if (step > EYE_LEAST_STEP && rest[i] < best->rest * size) {
-            best->rest = rest[i] / size;
-            best->top = (float)(low + i);
-            best->unit = unit;
-        }
+        quad size = step * step * (float)segments;
+        for (int k = 0; k < FOUR && i + k < n; k++)
+            if (step[k] > EYE_LEAST_STEP && rest[k] < best->rest * size[k]) {
+                best->rest = rest[k] / size[k];
+                best->top = (float)(low + i + k);
+                best->unit = unit;
+            }
     }
 }
 
@@ -179,7 +195,7 @@ static void refine(const float *sum, int rows, int bits, eye_slid *best)
 
 /* The code that fits best to a column's light (its running sum over ``rows``), of ``least`` to
  * ``most`` rows per segment, that covers the rows from ``from`` to ``end`` but for EYE_BLEEDING;
- * 0 where none does. */
+ * 0 where none does. Behind the sum there are EYE_BEYOND more numbers, whatever they are. */
 int eye_slide(const float *sum, int rows, int bits, float least, float most, int from, int end,
               eye_slid *best)
 {

@@ -137,10 +137,19 @@ static inline double eye_cumulative(double z)
     return z >= EYE_REACH ? 1.0 : eye_look_up(eye_cumulative_table, z);
 }
 
-/* The normal distribution's density, to 1e-5. */
-static inline double eye_bell(double z)
+/* That and the density of one ``z``, to 1e-5. */
+static inline void eye_normal(double z, double *cumulative, double *bell)
 {
-    return z > -EYE_REACH && z < EYE_REACH ? eye_look_up(eye_bell_table, z) : 0.0;
+    *cumulative = z >= EYE_REACH;
+    *bell = 0.0;
+    if (z > -EYE_REACH && z < EYE_REACH) {
+        double place = (z + EYE_REACH) * (EYE_STEPS / (2 * EYE_REACH));
+        int at = (int)place;
+        double rest = place - at;
+        const float *below = eye_cumulative_table + at, *height = eye_bell_table + at;
+        *cumulative = below[0] + rest * (below[1] - below[0]);
+        *bell = height[0] + rest * (height[1] - height[0]);
+    }
 }
 
 /* ---- light and colour ---- */

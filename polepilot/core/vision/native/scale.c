@@ -30,6 +30,7 @@
 /* Light along the strip in one channel, and just beside it, there from its mean. */
 typedef struct {
     double light[EYE_MOST_ROWS], beside[EYE_MOST_ROWS];
+    double weight[EYE_MOST_ROWS], root[EYE_MOST_ROWS]; /* what a row counts, and its root */
 } profile;
 
 /* The sums of one round of the fit. */
@@ -105,6 +106,15 @@ static void center(double *values, int from, int to)
         values[i] -= mean;
 }
 
+/* What the rows count. Photon noise: the variance of light grows with the light. */
+static void weigh(profile *seen, int from, int to)
+{
+    for (int i = from; i < to; i++) {
+        seen->weight[i] = 1 / (fabs(seen->light[i]) + DARK_NOISE);
+        seen->root[i] = sqrt(seen->weight[i]);
+    }
+}
+
 /* First values for the levels: linear least squares with the edges where they are. */
 static int fit_levels(const eye_upright *u, const profile *seen, const eye_wave *wave,
                       double *guess, int from, int to)
@@ -157,12 +167,11 @@ static void compare(const eye_upright *u, const profile *seen, const eye_wave *w
         double upper = u->first + i * u->bin;
         double rest = seen->light[i] - eye_wave_row(wave, &at, guess, upper, upper + u->bin,
                                                     seen->beside[i], row);
-        /* Photon noise: the variance of light grows with the light. */
-        double weight = 1 / (fabs(seen->light[i]) + DARK_NOISE);
+        double weight = seen->weight[i];
         add_row(out->normal, out->right, row, at.shows, rest, weight);
         weighted += rest * rest * weight;
         plain += rest * rest;
-        out->rests[i - from] = rest * sqrt(weight);
+        out->rests[i - from] = rest * seen->root[i];
     }
     int free = to - from - EYE_PARAMETERS;
     out->plain = plain;
@@ -267,6 +276,7 @@ static int fit_channel(const eye_upright *u, profile *seen, const char *code,
     center(seen->beside, from, to);
     if (to - from < EYE_PARAMETERS || !fit_levels(u, seen, &wave, guess, from, to))
         return EYE_NO_SCALE;
+    weigh(seen, from, to);
     for (int round = 0; round < ROUNDS; round++) {
         compare(u, seen, &wave, guess, constant, from, to, &sums);
         double moved = move(&sums, unit, segments, guess);

@@ -76,8 +76,10 @@ static double model_column(double x, double size, const double *guess, const sur
         double z0 = (x - size / 2 - place) * sharp, z1 = (x + size / 2 - place) * sharp;
         if (z1 < -SHOWS || z0 > SHOWS)
             continue;
-        double b0 = eye_bell(z0), b1 = eye_bell(z1);
-        double kernel = (eye_cumulative(z1) - eye_cumulative(z0)) * weight;
+        double c0, c1, b0, b1;
+        eye_normal(z0, &c0, &b0);
+        eye_normal(z1, &c1, &b1);
+        double kernel = (c1 - c0) * weight;
         double rise = of->rise[i];
         double level = guess[LEVEL] + guess[SLOPE] * u + (flat ? 0 : guess[BULGE] * rise);
         double by_place = (b0 - b1) * weight * sharp;

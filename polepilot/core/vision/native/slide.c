@@ -1,7 +1,7 @@
 /* Slides codes of all sizes along the light of one column: where does one fit?
  *
  * At whole rows first, four places at once, then finer about the best one. */
-#include "search.h"
+#include "lanes.h"
 
 #include <math.h>
 #include <string.h>
@@ -114,15 +114,14 @@ static int narrow(const float *sum, float segments, float unit, int *low, int n)
         quad light = at + more - load(from);
         quad shade = sum_at(from, fence) + more_at(from, fence) - at - more;
         quad_mask out = light - 2 * shade - least < 0;
-        int32_t is_out[FOUR];
-        memcpy(is_out, &out, sizeof out);
-        if (is_out[0] & is_out[1] & is_out[2] & is_out[3])
+        if (eye_are_all((eye_lanes)out))
             continue;
         at = sum_at(from, other_bar);
         more = more_at(from, other_bar);
         light = sum_at(from, end) + more_at(from, end) - at - more;
         shade = at + more - sum_at(from, other_fence) - more_at(from, other_fence);
         out |= light - 2 * shade - least < 0;
+        int32_t is_out[FOUR];
         memcpy(is_out, &out, sizeof out);
         for (int k = 0; k < FOUR && i + k < n; k++)
             if (!is_out[k]) {

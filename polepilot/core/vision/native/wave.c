@@ -52,8 +52,9 @@ static inline slope step_at(double upper, double lower, double place, double blu
         return (slope){0, 0, 0};
     if (z0 > SHOWS)
         return (slope){1, 0, 0};
-    double c0 = eye_cumulative(z0), c1 = eye_cumulative(z1);
-    double b0 = eye_bell(z0), b1 = eye_bell(z1);
+    double c0, c1, b0, b1;
+    eye_normal(z0, &c0, &b0);
+    eye_normal(z1, &c1, &b1);
     return (slope){blur * size * (z1 * c1 + b1 - z0 * c0 - b0), -size * (c1 - c0),
                    size * (b1 - b0)};
 }

@@ -21,11 +21,11 @@ static int beside(const eye_picture *p, double row, double reach, double column,
     for (int c = 0; c < p->channels; c++)
         light[c] = 0;
     for (int i = 0; i < ROWS; i++) {
-        int y = (int)floor(row + reach * (2 * i - 1) + 0.5);
+        int y = eye_floor(row + reach * (2 * i - 1) + 0.5);
         if (y < 0 || y >= p->rows)
             continue;
         for (int k = 0; k < COLUMNS; k++) {
-            int x = (int)floor(column + step * k + 0.5);
+            int x = eye_floor(column + step * k + 0.5);
             if (x < 0 || x >= p->columns)
                 continue;
             const uint8_t *pixel = p->pixels + (ptrdiff_t)y * p->stride + x * p->channels;

@@ -16,6 +16,7 @@ from polepilot.core.landmark import LandmarkKind
 from polepilot.core.observation import Image
 from polepilot.core.vision import kernel as module
 from polepilot.core.vision.kernel import IDS, MOST_STRIPS, REASONS, Kernel, Strip
+from polepilot.core.vision.paint import Paint
 
 KINDS = dict.fromkeys(range(1, 16), LandmarkKind())
 KERNEL = Kernel(KINDS, CAMERA.constant)
@@ -71,6 +72,23 @@ def test_a_cut_out_is_looked_at_alone() -> None:
     assert right == [6]
     assert read(IMAGE[:, :200]) == [13]
     assert read(IMAGE[:100]) == []
+
+
+@pytest.mark.parametrize(
+    ("paint", "channels"),
+    [("#ff6600", [0, 1, 2]), ("#0066ff", [2, 1, 0]), ("#66ff00", [0, 2, 1])],
+)
+def test_columns_near_the_edge_are_seen_as_any_others(paint: str, channels: list[int]) -> None:
+    # The kernel takes sixteen columns at once where there are as many.
+    kernel = Kernel(KINDS, CAMERA.constant, Paint.parse(paint))
+    image = picture([pole(13, 8.0, 0.1), pole(6, 7.0, -0.1)], seed=3)[:, :, channels]
+    whole = contents(kernel.look(image))
+    reasons, ids = zip(*[strip[:2] for strip in whole], strict=True)
+    assert [number for reason, number in zip(reasons, ids, strict=True) if not reason]
+    assert {6, 13} <= set(ids)
+    right = int(max(float(str(strip[4])) for strip in whole))
+    for width in range(right + 18, image.shape[1]):
+        assert contents(kernel.look(image[:, :width])) == whole
 
 
 def test_grey_in_two_shapes_and_as_a_channel() -> None:

@@ -150,8 +150,8 @@ def _best(readings: list[_Reading]) -> list[_Reading]:
 
 
 def _same_place(one: _Reading, other: _Reading) -> bool:
-    half = one.half
+    """Whether one of the two would hide a part of the other."""
     return (
-        abs(one.seen.column - other.seen.column) <= 0.24 * half
-        and abs(one.seen.row - other.seen.row) <= half + other.half
+        abs(one.seen.column - other.seen.column) < (one.seen.width + other.seen.width) / 2
+        and abs(one.seen.row - other.seen.row) <= one.half + other.half
     )

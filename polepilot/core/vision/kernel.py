@@ -20,7 +20,7 @@ from polepilot.core.vision.paint import ORANGE, Paint
 
 VERSION = 3
 IDS = 256
-MOST_STRIPS = 24
+MOST_STRIPS = 32
 _LIBRARY = Path(__file__).with_name("_kernel.so")
 _BYTE = np.dtype(np.uint8)
 _SHAPES = ((), (1,), (3,))

@@ -232,6 +232,15 @@ static eye_strip look_closely(const eye_picture *picture, const eye_task *task,
     return other.reason == EYE_READ ? other : strip;
 }
 
+/* Whether a candidate lies within a strip that was read. */
+static int is_within(const eye_candidate *c, const eye_strip *strip)
+{
+    double half = strip->unit * (2 * strip->bits + 5) / 2, row = (c->top + c->bottom) / 2;
+    double off = c->column - strip->column - strip->lean * (row - strip->row);
+    return strip->reason == EYE_READ && fabs(off) < strip->width / 2 &&
+           c->top > strip->row - half && c->bottom < strip->row + half;
+}
+
 int32_t eye_look(const eye_picture *picture, const eye_task *task, eye_strip *strips,
                  int32_t capacity)
 {
@@ -241,8 +250,13 @@ int32_t eye_look(const eye_picture *picture, const eye_task *task, eye_strip *st
     int n = eye_search(picture, task, candidates);
     if (n < 0)
         return -1;
-    n = n > capacity ? capacity : n;
-    for (int i = 0; i < n; i++)
-        strips[i] = look_closely(picture, task, candidates + i);
-    return n;
+    int looked = 0;
+    for (int i = 0; i < n && looked < capacity; i++) {
+        int known = 0;
+        for (int k = 0; k < looked && !known; k++)
+            known = is_within(candidates + i, strips + k);
+        if (!known)
+            strips[looked++] = look_closely(picture, task, candidates + i);
+    }
+    return looked;
 }

@@ -4,7 +4,7 @@
 
 #include "eye.h"
 
-#define EYE_MOST_CANDIDATES 24
+#define EYE_MOST_CANDIDATES 32
 #define EYE_MOST_ROWS 512    /* of a profile: about 4 a segment are needed */
 #define EYE_MOST_COLUMNS 160 /* of a profile across */
 #define EYE_LIGHTS 4         /* what is known of a segment: three channels and */

@@ -11,6 +11,7 @@
 #define ROWS_APART 3     /* every third row is asked for colour: the farthest end bar is as high */
 #define LINE 64          /* bytes of a cache line */
 #define LEAST_PEAK 30    /* grey levels of colour, somewhere in a column that is looked at */
+#define MOST_COLOUR 0.5f /* share of a column's coloured rows that a code by itself explains */
 #define LEAST_COLOURED 2 /* rows with colour, of those asked, in a column that is looked at */
 
 /* Which part of a column has the paint's colour at all, by the rows that were asked. */
@@ -122,16 +123,65 @@ static void fill(const eye_picture *p, const eye_task *task, int first, int coun
     }
 }
 
-/* Codes in one column: near ones among its runs, with and without noise; far ones. */
-static void look_at(eye_hits *hits, const uint8_t *signal, int first, int last, int x)
+/* The brightness of a column from the first row with colour to the last one. What has no colour, as
+ * black has none, is no brighter than what is between it and colour. */
+static void fill_light(const eye_hits *hits, const uint8_t *signal, int first, int last, int x,
+                       uint8_t *light)
+{
+    const eye_picture *p = hits->picture;
+    const uint8_t *pixel = p->pixels + (ptrdiff_t)p->channels * x;
+    int end = -1; /* of what is known */
+    memset(light, 0, (size_t)p->rows);
+    for (int y = first; y <= last; y++) {
+        if (signal[y] == 0)
+            continue;
+        int from = y - EYE_BLEEDING > 0 ? y - EYE_BLEEDING : 0;
+        int next = end < 0 ? from : end, ends = y + EYE_BLEEDING + 1 < p->rows ? y + EYE_BLEEDING + 1 : p->rows;
+        for (int k = next; k < ends; k++)
+            light[k] = (uint8_t)(eye_brightness(pixel + k * p->stride, p->channels, hits->task) / 16);
+        if (next < from) {
+            uint8_t most = light[next - 1] < light[from] ? light[next - 1] : light[from];
+            for (int k = next; k < from; k++)
+                light[k] = light[k] < most ? light[k] : most;
+        }
+        end = ends;
+    }
+}
+
+/* Near codes among the runs of a column, with and without noise. */
+static void match(eye_hits *hits, const uint8_t *signal, int x)
 {
     eye_run runs[EYE_MOST_RUNS], smooth[EYE_MOST_RUNS];
-    int n = eye_find_runs(signal, hits->picture->rows, runs), known = hits->n_hits;
+    int n = eye_find_runs(signal, hits->picture->rows, runs);
     if (n >= 2) { /* a bar and a bit, the other bar out of the picture */
         eye_match_runs(hits, runs, n, (float)x);
         int left = eye_smooth_runs(runs, n, smooth);
         if (left < n && left >= 2)
             eye_match_runs(hits, smooth, left, (float)x);
+    }
+}
+
+/* Whether one of the codes from ``known`` on explains most of the colour between two rows. */
+static int explains(const eye_hits *hits, int known, int first, int last)
+{
+    for (const eye_hit *h = hits->hits + known; h < hits->hits + hits->n_hits; h++)
+        if (h->bottom - h->top > MOST_COLOUR * (float)(last - first))
+            return 1;
+    return 0;
+}
+
+/* Codes in one column: near ones among the runs of its colour, and of its brightness where that does
+ * not explain most of it, as JPEG and cheap sensors leave brightness sharper; far ones. ``light``: room
+ * for a column. */
+static void look_at(eye_hits *hits, const uint8_t *signal, int first, int last, int x,
+                    uint8_t *light)
+{
+    int known = hits->n_hits;
+    match(hits, signal, x);
+    if (!explains(hits, known, first, last) &&
+        eye_is_coloured(hits->picture->channels, hits->task)) {
+        fill_light(hits, signal, first, last, x, light);
+        match(hits, light, x);
     }
     if (eye_is_coloured(hits->picture->channels, hits->task))
         eye_match_comb(hits, signal, first, last, x, known);
@@ -149,7 +199,7 @@ static void choose_bits(eye_hits *hits)
 }
 
 /* Looks at all columns that may hold a code, some neighbouring ones at a time. */
-static void look_at_all(eye_hits *hits, const extent *extents, uint8_t *signal)
+static void look_at_all(eye_hits *hits, const extent *extents, uint8_t *signal, uint8_t *light)
 {
     const eye_picture *p = hits->picture;
     int columns = (p->columns + EYE_APART - 1) / EYE_APART;
@@ -169,7 +219,8 @@ static void look_at_all(eye_hits *hits, const extent *extents, uint8_t *signal)
         bottom = bottom + 2 * ROWS_APART < p->rows ? bottom + 2 * ROWS_APART : p->rows - 1;
         fill(p, hits->task, first, c - first, top, bottom, signal);
         for (int k = first; k < c; k++)
-            look_at(hits, signal + (ptrdiff_t)(k - first) * p->rows, top, bottom, EYE_APART * k);
+            look_at(hits, signal + (ptrdiff_t)(k - first) * p->rows, top, bottom, EYE_APART * k,
+                    light);
     }
 }
 
@@ -188,15 +239,15 @@ int eye_search(const eye_picture *picture, const eye_task *task, eye_candidate *
     int n = -1;
     eye_hits *hits = malloc(sizeof *hits);
     extent *extents = malloc(sizeof *extents * columns);
-    uint8_t *signal = malloc((size_t)picture->rows * EYE_LANES);
-    if (hits && extents && signal) {
+    uint8_t *signal = malloc((size_t)picture->rows * EYE_LANES), *light = malloc((size_t)picture->rows);
+    if (hits && extents && signal && light) {
         hits->picture = picture;
         hits->task = task;
         hits->n_hits = hits->n_bits = 0;
         hits->slides = EYE_MOST_SLIDES;
         choose_bits(hits);
         survey(picture, task, extents);
-        look_at_all(hits, extents, signal);
+        look_at_all(hits, extents, signal, light);
         for (size_t c = 0; c < columns; c++)
             if (extents[c].faint >= LEAST_COLOURED && is_amid(extents, columns, c))
                 eye_match_faint(hits, (int)c * EYE_APART);
@@ -205,5 +256,6 @@ int eye_search(const eye_picture *picture, const eye_task *task, eye_candidate *
     free(hits);
     free(extents);
     free(signal);
+    free(light);
     return n;
 }

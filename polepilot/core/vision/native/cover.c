@@ -9,7 +9,7 @@
 #define STANDS_OUT 0.18 /* of bright - dark, in any channel */
 #define SAME 0.03       /* the same, of one thing that goes on beside the strip */
 #define ASLANT 0.6      /* segments */
-#define UNLIKE 2.5      /* times nearer to the other black than to what is beside it: paint */
+#define UNLIKE 1.6      /* times nearer to the other black than to what is beside it: paint */
 #define ROWS 2
 #define COLUMNS 2
 

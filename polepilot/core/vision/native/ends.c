@@ -179,11 +179,11 @@ static int look_at_bar(const view *v, const across *bits, double contrast, doubl
     return EYE_READ;
 }
 
-/* Looks at the end bars whose ends are not to be seen; the reason where one goes on. ``doubt``: how
+/* Looks at both end bars; the reason where one goes on. ``doubt``: how
  * much more a bar leaves over as paint than as what is behind it. */
 int eye_look_at_ends(const eye_picture *p, const eye_upright *u, const eye_scale *scale,
-                     const eye_side *side, const eye_candidate *candidate, const char *code,
-                     double levels[][EYE_LIGHTS], int segments, double *doubt)
+                     const eye_side *side, const char *code, double levels[][EYE_LIGHTS],
+                     int segments, double *doubt)
 {
     view v = {.picture = p, .scale = scale, .column = side->column, .row = u->row,
               .lean = u->lean, .half = side->half};
@@ -199,10 +199,7 @@ int eye_look_at_ends(const eye_picture *p, const eye_upright *u, const eye_scale
     double contrast = look_at_bits(&v, code, segments, dark, &bits);
     if (!(contrast > 0))
         return EYE_NO_CONTRAST;
-    int reason = EYE_READ;
-    if (candidate->open_top)
-        reason = look_at_bar(&v, &bits, contrast, segments / 2.0, -1, doubt);
-    if (candidate->open_bottom && reason == EYE_READ)
-        reason = look_at_bar(&v, &bits, contrast, segments / 2.0, 1, doubt);
-    return reason;
+    int reason = look_at_bar(&v, &bits, contrast, segments / 2.0, -1, doubt);
+    return reason != EYE_READ ? reason
+                              : look_at_bar(&v, &bits, contrast, segments / 2.0, 1, doubt);
 }

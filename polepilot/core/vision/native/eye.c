@@ -189,9 +189,7 @@ static int examine(const eye_picture *picture, const eye_task *task,
     /* Its lean is uncertain enough without half of a side. */
     if (lacks_bar(picture, &scale, segments) && !shows_sides(picture, &upright, &side))
         return EYE_CUT_OFF;
-    if (candidate->open_top || candidate->open_bottom)
-        reason = eye_look_at_ends(picture, &upright, &scale, &side, candidate, out->code, levels,
-                                  segments, &doubt);
+    reason = eye_look_at_ends(picture, &upright, &scale, &side, out->code, levels, segments, &doubt);
     if (reason != EYE_READ)
         return reason;
     if (eye_covered(picture, &upright, &scale, &side, out->code, levels, segments, scale.noise / 2))

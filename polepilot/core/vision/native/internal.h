@@ -80,9 +80,8 @@ int eye_read(const eye_task *task, double levels[][EYE_LIGHTS], int segments, in
 int eye_fit_side(const eye_picture *picture, const eye_upright *upright, double half, int flat,
                  eye_side *out);
 int eye_look_at_ends(const eye_picture *picture, const eye_upright *upright,
-                     const eye_scale *scale, const eye_side *side,
-                     const eye_candidate *candidate, const char *code, double levels[][EYE_LIGHTS],
-                     int segments, double *doubt);
+                     const eye_scale *scale, const eye_side *side, const char *code,
+                     double levels[][EYE_LIGHTS], int segments, double *doubt);
 int eye_covered(const eye_picture *picture, const eye_upright *upright, const eye_scale *scale,
                 const eye_side *side, const char *code, double levels[][EYE_LIGHTS], int segments,
                 double noise);

@@ -5,8 +5,10 @@
 
 #define LEAST_ROWS 8           /* of a picture; no code has fewer */
 #define ATTEMPTS 2             /* the second one with the code that the first has read */
-#define MOST_MISFIT 7.0        /* with one bright bit, */
-#define MISFIT_A_BIT 3.0       /* and more for every further one: the more there is to fit */
+#define MOST_MISFIT 7.0        /* of a near code, */
+#define FAR_MISFIT 1.5         /* and more of a far one, */
+#define MISFIT_A_BIT 7.0       /* with every further bright bit the more: the more there is to fit, */
+#define MISFIT_A_LAST_BIT 3.0  /* but less if all are bright: many things are evenly striped */
 #define USUAL_NOISE 0.035      /* rms rest of the fit of the edges, of bright - dark */
 #define USUAL_SIDE_NOISE 0.08  /* rms rest of the fit across, of its peak */
 #define USUAL_PITCH 0.035      /* radians between camera and pole */
@@ -17,9 +19,10 @@
 #define USUAL_DOUBT 0.35        /* rest of an end bar as paint, over its rest as what is behind it */
 #define SURE 6e-4              /* share of the unit: no second fit makes it better */
 #define SHARP 5.0              /* rows per segment: blurred colour still parts them */
-#define FAR 4.0                /* rows per segment: */
-#define FARTHER 1.5            /* rows less, and nothing fits well any more */
-#define MISFIT_A_FAR_BIT 7.0   /* what a further bright bit allows to a code with fewer */
+#define NEAR 9.0               /* rows per segment: from here on strips fit well, */
+#define FAR 4.5                /* from here down they need not; */
+#define EVEN_NEAR 4.0          /* the same for evenly striped ones */
+#define EVEN_FAR 2.5
 #define MOST_BLUR 0.5          /* rows, and three tenths of a segment */
 #define SHORTEST 1.25          /* rows per segment */
 
@@ -59,16 +62,17 @@ static double misfit(const eye_strip *strip, double constant, int sharp)
     return edges * edges + sides * sides + bend * bend + tint * tint + vague * vague;
 }
 
-/* How much of that a code may have: every bright bit more is evidence that it is one. */
+/* How much of that a code may have: of a far one every bright bit more is evidence that it is one. */
 static double most_misfit(const eye_strip *strip)
 {
+    double far = eye_limit((NEAR - strip->unit) / (NEAR - FAR), 0, 1);
+    double even = eye_limit((EVEN_NEAR - strip->unit) / (EVEN_NEAR - EVEN_FAR), 0, 1);
     int ones = 0;
     for (int bit = 0; bit < strip->bits; bit++)
         ones += strip->id >> bit & 1;
-    /* A code of bright bits alone is not as much evidence: many things are evenly striped. */
     if (ones == strip->bits)
-        return MOST_MISFIT + MISFIT_A_BIT * (ones - 2) * eye_limit((FAR - strip->unit) / FARTHER, 0, 1);
-    return MOST_MISFIT + (strip->unit < FAR ? MISFIT_A_FAR_BIT : MISFIT_A_BIT) * (ones - 1);
+        return MOST_MISFIT + MISFIT_A_LAST_BIT * (ones - 2) * even;
+    return MOST_MISFIT + (FAR_MISFIT + MISFIT_A_BIT * (ones - 1)) * far;
 }
 
 /* What is known as soon as there is a scale. */

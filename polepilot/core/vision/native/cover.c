@@ -10,6 +10,7 @@
 #define SAME 0.03       /* the same, of one thing that goes on beside the strip */
 #define ASLANT 0.6      /* segments */
 #define UNLIKE 1.6      /* times nearer to the other black than to what is beside it: paint */
+#define ANOTHER 0.3     /* times SAME, of two blacks */
 #define ROWS 2
 #define COLUMNS 2
 
@@ -91,8 +92,9 @@ int eye_covered(const eye_picture *p, const eye_upright *u, const eye_scale *sca
                     unlike = off > unlike ? off : unlike;
                 }
                 clear[way][i] |= tilt == 0 && most > STANDS_OUT * contrast;
-                /* More like what is beside it than like the other black. */
-                same[way][i] |= most < (SAME + noise) * contrast && most < UNLIKE * unlike;
+                /* More like what is beside it than like the other black, which it is not. */
+                same[way][i] |= most < (SAME + noise) * contrast && most < UNLIKE * unlike &&
+                                unlike > ANOTHER * (SAME + noise) * contrast;
             }
         }
     }

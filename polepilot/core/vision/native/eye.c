@@ -19,7 +19,7 @@
 #define USUAL_DOUBT 0.35        /* rest of an end bar as paint, over its rest as what is behind it */
 #define SURE 6e-4              /* share of the unit: no second fit makes it better */
 #define SHARP 5.0              /* rows per segment: blurred colour still parts them */
-#define NEAR 9.0               /* rows per segment: from here on strips fit well, */
+#define NEAR 7.5               /* rows per segment: from here on strips fit well, */
 #define FAR 4.5                /* from here down they need not; */
 #define EVEN_NEAR 4.0          /* the same for evenly striped ones */
 #define EVEN_FAR 2.5

@@ -20,7 +20,7 @@
 #define TILT 0.2        /* by so many more segments up or down each */
 #define LEVEL_TILTS 1   /* of them what is seen at one side only may have */
 #define SAME_BOTH 0.015 /* of bright - dark: how much one thing differs on the pole and beside, */
-#define SAME_SHARE 0.03 /* or of how much it stands out, if that is more */
+#define SAME_SHARE 0.045 /* or of how much it stands out, if that is more */
 #define SAME_ONE 0.02
 #define SAME_NOISE 0.2  /* times the fit's rest, more; */
 #define UNLIKE 5.0      /* times as much of SAME_ONE says nothing any more */

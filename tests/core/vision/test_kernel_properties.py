@@ -129,7 +129,7 @@ def test_a_mirrored_picture_mirrors_bearings_and_nothing_else() -> None:
 @pytest.mark.parametrize("down", [0, 1, 2, 5, 8])
 def test_black_borders_change_nothing(down: int) -> None:
     found = changes(look_with_borders(down, right=2 * down))
-    check(found, most=0.1, usual=1e-6)
+    check(found, most=0.15, usual=1e-6)
 
 
 def test_other_columns_give_the_same_within_the_noise() -> None:

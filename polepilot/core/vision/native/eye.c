@@ -193,7 +193,11 @@ static int examine(const eye_picture *picture, const eye_task *task,
     /* Its lean is uncertain enough without half of a side. */
     if (lacks_bar(picture, &scale, segments) && !shows_sides(picture, &upright, &side))
         return EYE_CUT_OFF;
-    reason = eye_look_at_ends(picture, &upright, &scale, &side, out->code, levels, segments, &doubt);
+    /* Pale far bars may be as bright as what is beside them: where colour is of no use, only those are
+     * asked whose ends are not to be seen. */
+    if (!sharp || candidate->open_top || candidate->open_bottom)
+        reason = eye_look_at_ends(picture, &upright, &scale, &side, out->code, levels, segments,
+                                  &doubt);
     if (reason != EYE_READ)
         return reason;
     if (eye_covered(picture, &upright, &scale, &side, out->code, levels, segments, scale.noise / 2))

@@ -38,7 +38,7 @@ _ROUND = 8
 """Segments per quarter turn of a capsule."""
 _FAR = 8.0
 """Bumps farther from each other than this, in the tool's radii, do not know of each other."""
-_LONGEST = 100.0
+_LONGEST = 250.0
 """Along a patch longer than so many tool widths there are no bumps."""
 _MOST_CUTS = 7
 """How often a patch is halved until one place sweeps each piece."""

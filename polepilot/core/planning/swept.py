@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import cv2
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import MultiPolygon, Polygon
+from shapely import MultiPolygon
 
 from polepilot.core.geometry import Point
 
@@ -177,34 +176,20 @@ class SweptArea:
 
     def missed(self) -> MultiPolygon:
         """What is left, as patches in `map`; those under 0.01 m² are dropped."""
-        contours, tree = cv2.findContours(self._left, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
-        patches: list[shapely.Geometry] = []
-        half = self.cell / 2
-        for index, contour in enumerate(contours):
-            if tree[0][index][3] != -1:
-                continue  # a hole, taken with its outline
-            holes = []
-            child = tree[0][index][2]
-            while child != -1:
-                holes.append(self._ring(contours[child]))
-                child = tree[0][child][0]
-            outline = self._ring(contour)
-            # Contours run through the middles of cells; half a cell belongs to the patch around.
-            if len(outline) < 3:
-                line = shapely.LineString([*outline, outline[-1]])
-                shape = line.buffer(half, cap_style="square")
-            else:
-                polygon = Polygon(outline, [hole for hole in holes if len(hole) > 2])
-                shape = polygon.buffer(0).union(polygon.exterior).buffer(half, join_style="mitre")
-            if shape.area >= SMALLEST_PATCH:
-                patches.append(shape)
-        united = shapely.union_all(patches)
-        return MultiPolygon(
-            [part for part in shapely.get_parts(united).tolist() if isinstance(part, Polygon)]
+        edges = np.diff(np.pad(self._left, ((0, 0), (1, 1))).view(np.int8), axis=1)
+        # Cells that lie beside one another in a row are one rectangle, and rectangles are united.
+        # Both lists run row by row, so the n-th begin belongs to the n-th end.
+        row, begin = np.nonzero(edges == 1)
+        _, end = np.nonzero(edges == -1)
+        ox, oy = np.asarray(self._origin) - self.cell / 2
+        runs = shapely.box(
+            ox + self.cell * begin,
+            oy + self.cell * row,
+            ox + self.cell * end,
+            oy + self.cell * (row + 1),
         )
-
-    def _ring(self, contour: NDArray[Any]) -> NDArray[np.float64]:
-        return np.asarray(contour[:, 0, :] * self.cell + np.array(self._origin), np.float64)
+        parts = shapely.get_parts(shapely.union_all(runs)).tolist()
+        return MultiPolygon([part for part in parts if part.area >= SMALLEST_PATCH])
 
     def _pixels(self, ring: shapely.LinearRing) -> NDArray[np.int32]:
         points = (np.asarray(ring.coords)[:, :2] - self._origin) / self.cell

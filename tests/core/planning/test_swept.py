@@ -37,6 +37,22 @@ def test_missed_keeps_holes_and_drops_crumbs() -> None:
     assert len(tiny.missed().geoms) == 1
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_missed_is_what_the_raster_says_however_ragged(seed: int) -> None:
+    """Strokes at all angles leave wedges, slivers and chains of single cells."""
+    rng = np.random.default_rng(seed)
+    swept = SweptArea(ROOM, 0.3, cell=0.05)
+    low, high = ROOM.bounds[:2], ROOM.bounds[2:]
+    ends = rng.uniform(low, high, (25, 2))
+    for a, b in pairwise(ends):
+        swept.sweep(tuple(a), tuple(b))
+    missed = swept.missed()
+    assert missed.is_valid
+    assert missed.area <= swept.missed_area + 1e-9
+    assert missed.area == pytest.approx(swept.missed_area, rel=0.05)  # the rest are crumbs
+    assert missed.area / 0.05**2 == pytest.approx(round(missed.area / 0.05**2), abs=1e-6)
+
+
 def test_a_point_is_a_disc() -> None:
     swept = SweptArea(MultiPolygon([box(-1, -1, 1, 1)]), 0.4)
     swept.sweep((0, 0), (0, 0))

@@ -267,7 +267,7 @@ def figures(verdicts: Sequence[Verdict]) -> dict[str, Any]:
         "heading_mean_deg": math.degrees(_mean(heading)),
         "heading_p95_deg": math.degrees(_p95(heading)),
         "heading_max_deg": math.degrees(float(heading.max(initial=0.0))),
-        "poses_percent": 100 * sum(one.given for one in verdicts) / sum(v.due for v in verdicts),
+        "poses_percent": _percent(sum(v.given for v in verdicts), sum(v.due for v in verdicts)),
         "first_pose_s": max(one.first_pose for one in verdicts),
         "nees_mean": _mean(nees),
         "nees_inside_percent": 100 * _mean((nees < BOUND).astype(float)),
@@ -282,7 +282,9 @@ def figures(verdicts: Sequence[Verdict]) -> dict[str, Any]:
         "microseconds_per_frame": float(np.mean([one.frame_microseconds for one in verdicts])),
         "frames_with_whole_pole_percent": 100 * float(np.mean([v.whole_frames for v in verdicts])),
         "frames_with_detection_percent": 100 * float(np.mean([v.read_frames for v in verdicts])),
-        "whole_read_percent": 100 * sum(v.read for v in verdicts) / sum(v.whole for v in verdicts),
+        "whole_read_percent": _percent(
+            sum(v.read for v in verdicts), sum(v.whole for v in verdicts)
+        ),
         "cut_read": sum(one.cut_read for one in verdicts),
         "not_in_view": sum(one.wrong for one in verdicts),
         "range_mean_percent": 100 * _mean(np.abs(ratio)),
@@ -298,7 +300,7 @@ def figures(verdicts: Sequence[Verdict]) -> dict[str, Any]:
             "position_p95_cm": 100 * _p95(one.position),
             "heading_mean_deg": math.degrees(_mean(one.heading)),
             "heading_p95_deg": math.degrees(_p95(one.heading)),
-            "poses_percent": 100 * one.given / one.due,
+            "poses_percent": _percent(one.given, one.due),
             "nees_mean": _mean(one.nees),
             "nees_inside_percent": 100 * _mean((one.nees < BOUND).astype(float)),
             "recovery_s": one.recovery,
@@ -307,6 +309,11 @@ def figures(verdicts: Sequence[Verdict]) -> dict[str, Any]:
         for one in verdicts
     ]
     return row
+
+
+def _percent(part: float, whole: float) -> float:
+    """NaN of nothing: a robot that never moves owes no pose."""
+    return 100 * part / whole if whole else math.nan
 
 
 def _mean(values: Floats) -> float:

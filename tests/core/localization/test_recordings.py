@@ -26,7 +26,7 @@ from recordings.scenario import (
     draw,
 )
 from recordings.sights import sights
-from recordings.verdict import figures, judge
+from recordings.verdict import Verdict, figures, judge
 
 from polepilot.core.landmark import LandmarkKind, encode
 from polepilot.core.robot.dataset import read_dataset
@@ -176,3 +176,10 @@ def test_a_lifted_robot_finds_itself_again(keep: Path) -> None:
     assert verdict.recovery is not None
     assert verdict.recovery <= 3.0
     assert not verdict.false_reports
+
+
+def test_a_robot_that_never_moves_owes_no_pose() -> None:
+    row = figures([Verdict("room", 1, microseconds=1.0)])
+    assert math.isnan(row["poses_percent"])
+    assert math.isnan(row["whole_read_percent"])
+    assert math.isnan(row["by_seed"][0]["poses_percent"])

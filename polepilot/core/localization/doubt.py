@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Collection, Container
+from collections.abc import Container
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
@@ -13,45 +12,6 @@ from polepilot.core.observation import RangeBearing
 _MOST = 200
 _LONG = 5.0
 """Seconds after which one contradicting landmark is enough."""
-
-
-@dataclass(slots=True)
-class Trial:
-    """Two landmarks make a pose; if one of them was moved, it is wrong, and both agree with it.
-
-    Until a third one agrees too, what contradicts the pose is not forgotten.
-    """
-
-    fixed_by: frozenset[int] = frozenset()
-    against: list[RangeBearing] = field(default_factory=list)
-
-    @property
-    def over(self) -> bool:
-        return len(self.fixed_by) != 2
-
-    def begin(self, fixed_by: Collection[int]) -> None:
-        self.fixed_by = frozenset(fixed_by)
-        self.against.clear()
-
-    def agrees(self, number: int) -> None:
-        if number not in self.fixed_by:
-            self.begin(())
-
-    def contradicts(self, measurement: RangeBearing) -> str:
-        """Why the pose is to be given up; empty where it is not."""
-        if self.over:
-            return ""
-        self.against.append(measurement)
-        del self.against[:-_MOST]
-        counts = Counter(one.landmark for one in self.against)
-        firm = sorted(number for number, count in counts.items() if count >= 2)
-        if len(firm) < 2:
-            return ""
-        one, other = sorted(self.fixed_by)
-        return (
-            f"Landmarks {' and '.join(map(str, firm))} contradict the pose that {one} and {other} "
-            "have given: one of those has been moved."
-        )
 
 
 class Judgement(NamedTuple):

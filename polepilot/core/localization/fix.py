@@ -25,6 +25,10 @@ from polepilot.core.observation import RangeBearing
 
 Array = NDArray[np.float64]
 
+_ELSEWHERE = 0.20
+"""Metres by which two poses differ that cannot both be right."""
+_PLAUSIBLE = 0.5
+"""Of the error that is allowed, on average, for a pose to be taken for a rival of the best one."""
 _SINGULAR = 1e-13
 """Smallest against largest information; beyond it an inverse is rounding errors."""
 
@@ -87,6 +91,15 @@ class _Cluster(NamedTuple):
     local: Point
     """Where it is in the robot's frame."""
     sigma: float
+
+
+class _Candidate(NamedTuple):
+    """A pose that some landmarks agree with."""
+
+    score: tuple[int, bool, int, float]
+    """How many, whether they do so well, by how many sightings, and how well."""
+    pose: Pose2D
+    agreeing: list[_Cluster]
 
 
 def circle_intersections(
@@ -261,9 +274,7 @@ def _consensus(
     clusters: list[_Cluster], settings: FixSettings
 ) -> tuple[Pose2D, list[_Cluster]] | None:
     """The pose that most landmarks agree with; None where not even two do, or it is a draw."""
-    best: tuple[int, int, float] | None = None
-    answer: tuple[Pose2D, list[_Cluster]] | None = None
-    rival = 0
+    found: list[_Candidate] = []
     for first, second in combinations(clusters, 2):
         pose = _align(first, second, settings)
         if pose is None:
@@ -276,21 +287,24 @@ def _consensus(
             if error <= allowed:
                 agreeing.append(cluster)
                 cost += error / allowed
-        if len(agreeing) < 2:
-            continue
-        score = (len(agreeing), sum(len(c.members) for c in agreeing), -cost)
-        same = answer is not None and {c.landmark.id for c in agreeing} & {
-            c.landmark.id for c in answer[1]
-        }
-        if best is None or score > best:
-            if answer is not None and not same:
-                rival = max(rival, len(answer[1]))
-            best, answer = score, (pose, agreeing)
-        elif not same:
-            rival = max(rival, len(agreeing))
-    if answer is None or rival >= len(answer[1]):
+        if len(agreeing) >= 2:
+            plausible = cost <= _PLAUSIBLE * len(agreeing)
+            sightings = sum(len(c.members) for c in agreeing)
+            score = (len(agreeing), plausible, sightings, -cost)
+            found.append(_Candidate(score, pose, agreeing))
+    if not found:
         return None
-    return answer
+    best = max(found, key=lambda one: one.score)
+    ids = {cluster.landmark.id for cluster in best.agreeing}
+    for rival in found:
+        others = {cluster.landmark.id for cluster in rival.agreeing}
+        if rival.score[:2] < best.score[:2] or others == ids:
+            continue
+        # As many landmarks for a pose somewhere else: who is right?
+        apart = math.dist(best.pose.position, rival.pose.position)
+        if not ids & others or apart > _ELSEWHERE:
+            return None
+    return best.pose, best.agreeing
 
 
 def _align(first: _Cluster, second: _Cluster, settings: FixSettings) -> Pose2D | None:

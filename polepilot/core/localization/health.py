@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
@@ -28,6 +28,11 @@ _MEMORY = 60.0
 _SCATTER = 0.12
 """How well they must agree on the new place, metres."""
 _SHIFT = 0.12
+_PAUSE = 1.0
+"""Seconds between two rows of sightings."""
+_SUREST = 0.01
+"""Metres; no place is known better."""
+_SIMILAR = 1.3
 _FAMILY = 0.35
 """A place this near to another landmark is that landmark, misread."""
 
@@ -111,15 +116,14 @@ class LandmarkHealth:
         points = np.array([point for _, point, _ in places])
         apart = np.hypot(*(points - np.median(points, axis=0)).T)
         scatter = float(np.median(apart))
-        # The surer the pose was, the more a sighting counts.
-        weights = np.array([1.0 / max(sigma, 0.01) ** 2 for _, _, sigma in places])
-        middle = np.average(points, axis=0, weights=weights * (apart <= max(scatter, _SCATTER)))
+        near = apart <= max(scatter, _SCATTER)
+        middle = _middle([one for one, taken in zip(places, near, strict=True) if taken])
         mark = self.landmarks[number]
-        dx, dy = float(middle[0]) - mark.x, float(middle[1]) - mark.y
+        dx, dy = middle[0] - mark.x, middle[1] - mark.y
         if scatter > _SCATTER or math.hypot(dx, dy) < _SHIFT:
             return None
         self._places.pop(number)
-        if self.stands_another(number, (float(middle[0]), float(middle[1]))):
+        if self.stands_another(number, middle):
             return Verdict(number, "landmark_misread", dx, dy)
         self.moved[number] = (dx, dy)
         return Verdict(number, "landmark_moved", dx, dy)
@@ -151,3 +155,24 @@ class LandmarkHealth:
     def forget(self) -> None:
         """The pose itself was wrong: what contradicted it says nothing of the landmarks."""
         self._places.clear()
+
+
+def _middle(places: Sequence[tuple[float, Point, float]]) -> Point:
+    """Where a landmark stands, by the stamps, places and sigmas of its sightings.
+
+    Sightings in a row share the pose's error, which grows: only the surest of each row count.
+    """
+    x = y = weight = 0.0
+    row: list[tuple[float, Point, float]] = []
+    for one, after in zip(places, [*places[1:], None], strict=True):
+        row.append(one)
+        if after is not None and after[0] - one[0] < _PAUSE:
+            continue
+        best = max(min(sigma for _, _, sigma in row), _SUREST)
+        chosen = [point for _, point, sigma in row if sigma <= _SIMILAR * best]
+        share = 1.0 / best**2
+        x += share * sum(point[0] for point in chosen) / len(chosen)
+        y += share * sum(point[1] for point in chosen) / len(chosen)
+        weight += share
+        row.clear()
+    return x / weight, y / weight

@@ -17,7 +17,7 @@ from itertools import groupby
 from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.landmark import Landmark
 from polepilot.core.localization.belief import Belief
-from polepilot.core.localization.doubt import Doubt, Trial
+from polepilot.core.localization.doubt import Doubt
 from polepilot.core.localization.ekf import PoseFilter
 from polepilot.core.localization.events import EventLog
 from polepilot.core.localization.events import LocalizerEvent as LocalizerEvent
@@ -32,6 +32,7 @@ from polepilot.core.localization.settings import LocalizerSettings as LocalizerS
 from polepilot.core.localization.settings import Method as Method
 from polepilot.core.localization.suspicion import Suspected, Suspicion
 from polepilot.core.localization.track import Filter, Track
+from polepilot.core.localization.trial import Trial
 from polepilot.core.observation import Odometry, PoseEstimate, RangeBearing, Status
 from polepilot.core.vehicle import Vehicle
 
@@ -81,7 +82,7 @@ class Localizer:
             None if half_view is None else Presence(self._landmarks, camera_forward, half_view)
         )
         self._doubt = Doubt(self.settings.tolerance, self.settings.method == "paper")
-        self._trial = Trial()
+        self._trial = Trial(self._landmarks, self.settings.tolerance, self.settings.fix.slack)
         self._suspicion = Suspicion(self.settings.tolerance)
         self._filter: Filter = (
             RadialFilter(vehicle.wheelbase, camera_forward)
@@ -152,7 +153,7 @@ class Localizer:
         if track is None:
             return None
         ahead = self._ahead = self._predicted_to(now, track)
-        covariance = ahead.filter.pose_covariance
+        covariance = ahead.filter.pose_covariance + self._trial.covariance(ahead.filter.pose)
         suspected = self._judge(ahead)
         belief = self._belief
         # Something contradicts the pose and nothing has confirmed it since, or it cannot be told.
@@ -214,7 +215,8 @@ class Localizer:
                 self._filter = tracked
                 self._history.retune(following)
                 track = None
-        self._given_up, self._agreeing = track, 0
+        # A pose that was never confirmed is not to be taken up again by the same two landmarks.
+        self._given_up, self._agreeing = track if self._trial.over else None, 0
         self._track = self._ahead = self._before = None
         self._measured = self._predicted = None
         self._belief.seek(reason)
@@ -222,8 +224,7 @@ class Localizer:
         if len(self._landmarks) - len(self._health.moved) < 2:
             # With so few left, it is as likely that the pose was wrong.
             self._health.moved.clear()
-        against = sorted({*self._trial.against, *self._doubt.against}, key=lambda m: m.stamp)
-        self._trial.begin(())
+        against = sorted({*self._trial.give_up(), *self._doubt.against}, key=lambda m: m.stamp)
         self._doubt.clear()
         self._last_agreed.clear()
         self._health.forget()
@@ -292,6 +293,7 @@ class Localizer:
 
     def _begin(self, stamp: float, found: Fix) -> bool:
         """Whether all that was seen fits to the fix so well that it is believed."""
+        on_trial = self._trial.failed
         started = self._filter.copy()
         sightings = [(m, self._landmarks[m.landmark]) for m in self._search.used]
         share = started.begin(found, stamp, sightings, self._history)
@@ -302,7 +304,12 @@ class Localizer:
             return False
         self._before = (stamp, self._filter, self._history.following)
         self._accept(track, stamp, found.landmarks)
-        self._trial.begin(found.landmarks)
+        self._trial.begin(found.landmarks, self._search.used)
+        if self._trial.over:
+            # Of a landmark that was seen before all others the robot may have been taken away.
+            since = -math.inf if on_trial else self._search.used[0].stamp
+            for outside in (one for one in self._search.outside if one[1] >= since):
+                self._contradicted(*outside)
         self._measured = (stamp, found.pose)
         ids = ", ".join(str(number) for number in found.landmarks)
         code = "refixed" if self._fixes else "fixed"
@@ -395,7 +402,7 @@ class Localizer:
         if taken:
             self._last_agreed[number] = stamp
             health.agreed(number)
-            self._trial.agrees(number)
+            self._trial.agrees(measurement)
             if gap < 0.5 * settings.tolerance:
                 for verdict in health.witnessed(number):
                     self._tell(verdict, stamp)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from polepilot.core.geometry import Pose2D
+from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.landmark import Landmark
 from polepilot.core.localization.fix import Fix, FixRefusal, FixSettings, fix
 from polepilot.core.localization.odometry import OdometryHistory
@@ -48,6 +48,9 @@ class FixSearch:
 
     used: tuple[RangeBearing, ...] = ()
     """The sightings behind the last fix, as they were measured, oldest first."""
+    outside: tuple[tuple[int, float, Point, float], ...] = ()
+    """Sightings that contradict it: which landmark, when, where in `map` it appears, and how well
+    that is known, metres."""
 
     def clear(self) -> None:
         self._sightings.clear()
@@ -130,6 +133,18 @@ class FixSearch:
             )
             return None
         self.used = tuple(m for m in chosen if m.landmark in answer.landmarks)
+        self.outside = tuple(
+            (
+                m.landmark,
+                m.stamp,
+                answer.pose.to_parent(
+                    mount.to_parent((m.range * math.cos(m.bearing), m.range * math.sin(m.bearing)))
+                ),
+                math.hypot(m.range_sigma, m.range * m.bearing_sigma),
+            )
+            for m, mount in zip(kept, mounts, strict=True)
+            if m.landmark in answer.outliers
+        )
         return answer
 
     def _carry(self, sighting: RangeBearing, stamp: float) -> tuple[RangeBearing, Pose2D] | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from polepilot.core.localization.doubt import Doubt, Trial
+from polepilot.core.localization.doubt import Doubt
 from polepilot.core.observation import RangeBearing
 
 
@@ -45,21 +45,3 @@ def test_one_that_contradicts_for_long_is_enough() -> None:
     judged = doubt.judge(6.0, set(), False)
     assert judged is not None
     assert judged.status == "lost"
-
-
-def test_a_pose_of_two_landmarks_is_on_trial_until_a_third_agrees() -> None:
-    trial = Trial()
-    assert trial.contradicts(seen(5)) == ""
-    trial.begin((1, 2))
-    trial.agrees(1)
-    assert [trial.contradicts(seen(n)) for n in (3, 3, 4)] == ["", "", ""]
-    assert trial.contradicts(seen(4)) == (
-        "Landmarks 3 and 4 contradict the pose that 1 and 2 have given: one of those has been "
-        "moved."
-    )
-    trial.begin((1, 2))
-    trial.agrees(3)
-    assert trial.over
-    assert [trial.contradicts(seen(n)) for n in (4, 4, 5, 5)] == [""] * 4
-    trial.begin((1, 2, 3))
-    assert trial.over

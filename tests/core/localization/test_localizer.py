@@ -193,6 +193,8 @@ MARKS = {
     3: Landmark(3, -3.0, 0.0),
 }
 
+WITNESS = Landmark(4, 0.0, -4.0)
+
 
 def sight(stamp: float, number: int, x: float = 0.0, y: float = 0.0) -> RangeBearing:
     """Seen from a robot whose heading is 0 and whose camera stands at x, y."""
@@ -203,11 +205,12 @@ def sight(stamp: float, number: int, x: float = 0.0, y: float = 0.0) -> RangeBea
 
 
 def standing() -> Localizer:
-    """A localizer with a fix at x = -0.1, y = 0."""
-    localizer = Localizer(MARKS, Vehicle(), FORWARD)
+    """A localizer with a fix at x = -0.1, y = 0, by landmarks 1 and 2; a fourth one agrees."""
+    localizer = Localizer({**MARKS, 4: WITNESS}, Vehicle(), FORWARD)
     localizer.add_odometry(Odometry(0.0, 0.0, 0.0))
     for index in range(4):
         localizer.add_measurements([sight(0.1 * index, 1), sight(0.1 * index, 2)])
+    localizer.add_measurements([RangeBearing(0.3, 4, 4.0, -math.pi / 2, 0.01, 0.001)])
     assert localizer.status is Status.TRACKING
     assert [event.code for event in localizer.events()] == ["fixed"]
     assert localizer.events() == []

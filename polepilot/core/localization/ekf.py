@@ -149,14 +149,17 @@ class PoseFilter:
     @property
     def map_misfit(self) -> MapMisfit:
         """How far landmarks had to be moved for everything to agree."""
-        shifts = self.state[STATES:] / self.noise.survey_sigma
+        shifts = self.state[STATES:]
         if not len(shifts):
             return MapMisfit()
-        squares = shifts * shifts
-        worst = int(squares.argmax()) // 2
-        number = next(k for k, place in self._places.items() if place == STATES + 2 * worst)
-        left = self.covariance.diagonal()[STATES:] / self.noise.survey_sigma**2
-        return MapMisfit(float(squares.sum()), len(shifts) - float(left.sum()), number)
+        unit = self.noise.survey_sigma**2
+        freedom = len(shifts) - float(self.covariance.diagonal()[STATES:].sum()) / unit
+        misfit = MapMisfit(float(shifts @ shifts) / unit, freedom)
+        if not misfit.improbable:
+            return misfit
+        worst = STATES + 2 * (int(np.abs(shifts).argmax()) // 2)
+        number = next(k for k, place in self._places.items() if place == worst)
+        return misfit._replace(worst=number)
 
     def begin(
         self,
@@ -227,14 +230,15 @@ class PoseFilter:
         pan = measurement.bearing if measurement.pan is None else measurement.pan
         shapes = _legendre(min(max(pan / noise.pan_range, -1.0), 1.0))
         jacobian = np.zeros((2, len(self.state)))
-        jacobian[0, :3] = (-ux * scale, -uy * scale, (ux * arm_y - uy * arm_x) * scale)
+        jacobian[:, :3] = (
+            (-ux * scale, -uy * scale, (ux * arm_y - uy * arm_x) * scale),
+            (tx, ty, tx * -arm_y + ty * arm_x - 1.0),
+        )
         jacobian[0, RANGE] = distance
-        jacobian[1, :3] = (tx, ty, tx * -arm_y + ty * arm_x - 1.0)
         jacobian[1, PAN:STATES] = shapes
         own = 0.0
         if place is not None:
-            jacobian[0, place : place + 2] = (ux * scale, uy * scale)
-            jacobian[1, place : place + 2] = (-tx, -ty)
+            jacobian[:, place : place + 2] = ((ux * scale, uy * scale), (-tx, -ty))
         else:
             own = noise.survey_sigma**2
         pan_error = sum(map(mul, shapes, bends))

@@ -20,7 +20,7 @@ class NoiseModel:
     """Of the speed, as a share of it: wheels slip."""
     steering_prior: float = math.radians(1.5)
     steering_walk: float = math.radians(0.02)
-    steering_noise: float = math.radians(0.3)
+    steering_noise: float = math.radians(0.2)
     servo_lag_prior: float = 0.06
     motor_lag_prior: float = 0.05
     slowness_prior: float = 0.12

@@ -10,9 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left
-from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -152,9 +150,10 @@ class _Bumped:
     def left(self, patches: list[Polygon], smallest: float) -> list[Polygon]:
         """What bumps leave of some patches, each at least ``smallest`` m²."""
         swept = np.array([bump.swept for bump in self._bumps], dtype=object)
-        tree = shapely.STRtree(swept)
-        rest = [patch.difference(shapely.union_all(swept[tree.query(patch)])) for patch in patches]
-        return [part for piece in rest for part in patches_of(piece, smallest)]
+        rest = np.array(patches, dtype=object)
+        for patch, bump in shapely.STRtree(swept).query(rest, predicate="intersects").T.tolist():
+            rest[patch] = rest[patch].difference(swept[bump])
+        return patches_of(rest, smallest)
 
     def _step_aside(self, piece: Polygon) -> bool:
         """Leads a stretch of a straight leg nearer to a piece of a strip beside it."""
@@ -183,7 +182,7 @@ class _Bumped:
             if self._taken(first, last):
                 continue
             tips = np.vstack([a + along * (at - half), a + along * (at + half)]) + depth * beside
-            left = piece.difference(self._swept(tips)).area
+            left = piece.difference(LineString(tips).buffer(radius, quad_segs=_ROUND)).area
             if left < _LOSS * (radius / 0.2) ** 2 and self._try(first, last, tips, 4.0):
                 return True
         return False
@@ -251,19 +250,21 @@ class _Bumped:
         if not self._space.holds_points(new):
             return False
         most = losses * _LOSS * (self._radius / 0.2) ** 2
-        if last - first > 1e-9 and self._loses(new, first, last, most):
+        line = LineString(new)
+        swept = line.buffer(self._radius, quad_segs=_ROUND)
+        if last - first > 1e-9 and self._loses(new, swept, first, last, most):
             return False
-        self._put(_Bump(first, last, tips, LineString(new), self._swept(new)))
+        self._put(_Bump(first, last, tips, line, swept))
         return True
 
-    def _loses(self, new: Points, first: float, last: float, most: float) -> bool:
-        """Whether more than ``most`` m² are swept no more if the path goes along ``new`` from
-        ``first`` to ``last``."""
-        inner = self._few[(self._few_marks > first + 1e-9) & (self._few_marks < last - 1e-9)]
-        old = np.vstack([new[0], inner, new[-1]])
-        lost = shapely.union_all(self._capsules(pairwise(old)))
-        for capsule in self._capsules(pairwise(new)):
-            lost = lost.difference(capsule)
+    def _loses(
+        self, new: Points, swept: shapely.Geometry, first: float, last: float, most: float
+    ) -> bool:
+        """Whether more than ``most`` m² are swept no more if the path goes along ``new``, which
+        sweeps ``swept``, from ``first`` to ``last``."""
+        begin, end = np.searchsorted(self._few_marks, [first + 1e-9, last - 1e-9])
+        old = LineString(np.vstack([new[0], self._few[begin:end], new[-1]]))
+        lost = old.buffer(self._radius, quad_segs=_ROUND).difference(swept)
         if lost.area <= most:
             return False
         mine = self._near(*new[1].tolist())
@@ -290,13 +291,10 @@ class _Bumped:
                 return False
         return self._target.area_in(lost) > most
 
-    def _capsules(self, lines: Iterable[tuple[Points, Points] | Points]) -> Shapes:
+    def _capsules(self, lines: list[Points]) -> Shapes:
         """What is swept along straight lines, each on its own."""
-        ends = np.array([np.vstack([line[0], line[1]]) for line in lines])
-        return np.asarray(shapely.buffer(shapely.linestrings(ends), self._radius, quad_segs=_ROUND))
-
-    def _swept(self, line: Points) -> shapely.Geometry:
-        return shapely.union_all(self._capsules(pairwise(line)))
+        ends = shapely.linestrings(np.array(lines))
+        return np.asarray(shapely.buffer(ends, self._radius, quad_segs=_ROUND))
 
     def _kept(self, index: int, gone: list[tuple[float, float]]) -> list[Points]:
         """What is left of a segment of the path without some stretches of it."""
@@ -313,16 +311,15 @@ class _Bumped:
         return [np.vstack([self._at(a), self._at(b)]) for a, b in spans]
 
     def _at(self, mark: float) -> Points:
-        return np.array(
-            [
-                np.interp(mark, self._marks, self._path[:, 0]),
-                np.interp(mark, self._marks, self._path[:, 1]),
-            ]
-        )
+        index = min(max(bisect_left(self._marks, mark), 1), len(self._marks) - 1)
+        before, after = float(self._marks[index - 1]), float(self._marks[index])
+        share = (mark - before) / (after - before) if after > before else 0.0
+        a, b = self._path[index - 1], self._path[index]
+        return np.asarray(a + min(max(share, 0.0), 1.0) * (b - a))
 
     def _stretch(self, first: float, last: float) -> Points:
-        inner = self._path[(self._marks > first + 1e-9) & (self._marks < last - 1e-9)]
-        return np.vstack([self._at(first), inner, self._at(last)])
+        begin, end = np.searchsorted(self._marks, [first + 1e-9, last - 1e-9])
+        return np.vstack([self._at(first), self._path[begin:end], self._at(last)])
 
     def result(self, parts: tuple[PlanPart, ...]) -> tuple[Points, tuple[PlanPart, ...]]:
         """The path with all bumps, and its parts."""

@@ -37,7 +37,7 @@ from polepilot.core.planning.space import (
     other_starts,
 )
 from polepilot.core.planning.swept import few_corners, swept_shape
-from polepilot.core.planning.target import CHORD, Target
+from polepilot.core.planning.target import Target
 from polepilot.core.planning.unreachable import unreachable_pieces
 from polepilot.core.planning.wording import in_words
 from polepilot.core.site import Site
@@ -65,10 +65,7 @@ _RAGGED = 0.1
 """How exactly the outlines of patches are followed, in tool widths."""
 _MANY = 60
 _LARGE = 5000.0
-"""Up to so many squares of the tool several spacings are tried, and the coverage is predicted more
-exactly."""
-_EXACT = 0.0002
-"""How exactly the coverage is predicted, in metres along the edge of what is swept."""
+"""Up to so many squares of the tool several spacings are tried."""
 _SMALLEST = 0.008
 """Missed patches below this are left, m² for a tool of 0.4 m; scaled with its square."""
 
@@ -111,12 +108,11 @@ def plan_scan(
     report(0.8, "unreachable parts")
     missing = unreachable_pieces(space, reachable)
     report(0.9, "prediction")
-    large = wanted.area > _LARGE * options.tool_width**2
-    exact = Target(wanted, options.tool_width, CHORD if large else _EXACT)
-    left = exact.missed_area(path)
+    everything = target if swept is wanted else Target(wanted, options.tool_width)
+    left = everything.missed_area(path)
     # All that a path sweeps is reachable; with patches it sweeps other floor as well.
-    under = exact.area - left if area is None else swept_shape(path, options.tool_width).area
-    predicted = predict(path, gear, options, 1.0 - left / exact.area, under)
+    under = wanted.area - left if area is None else swept_shape(path, options.tool_width).area
+    predicted = predict(path, gear, options, 1.0 - left / wanted.area, under)
     report(1.0, "done")
     return Plan(
         mode="scan",

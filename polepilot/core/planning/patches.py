@@ -12,6 +12,7 @@ from shapely import Polygon
 from polepilot.core.planning.space import FreeSpace, polygons
 
 Points = NDArray[np.float64]
+Shapes = NDArray[np.object_]
 
 SLIVER = 0.002
 """What is thinner than twice this is left, metres."""
@@ -21,8 +22,10 @@ _ROUND = 12
 """Segments per quarter turn of a disc."""
 
 
-def patches_of(missed: shapely.Geometry, smallest: float, sliver: float = SLIVER) -> list[Polygon]:
-    """Its parts of at least ``smallest`` m², without what is thinner than twice ``sliver``."""
+def patches_of(
+    missed: shapely.Geometry | Shapes, smallest: float, sliver: float = SLIVER
+) -> list[Polygon]:
+    """The parts of at least ``smallest`` m², without what is thinner than twice ``sliver``."""
     large = [part for part in polygons(missed) if part.area >= smallest]
     thick = shapely.buffer(large, -sliver, quad_segs=2)
     opened = shapely.buffer(thick, sliver, quad_segs=2)

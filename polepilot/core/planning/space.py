@@ -329,8 +329,8 @@ def quadrant(radius: float, error: float = CHORD) -> int:
     return Footprint(radius, error).quadrant
 
 
-def polygons(shape: shapely.Geometry) -> list[Polygon]:
-    """The polygons of any shape, without lines, points and empty ones."""
+def polygons(shape: shapely.Geometry | NDArray[np.object_]) -> list[Polygon]:
+    """The polygons of any shape or shapes, without lines, points and empty ones."""
     return [
         part
         for part in shapely.get_parts(shape).tolist()

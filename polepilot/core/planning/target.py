@@ -1,23 +1,22 @@
 """What a tool is to sweep, and what of it a path misses: tile by tile, and only where it is new.
 
 A path is changed in many small steps, and after each of them it is asked what it misses. The
-area is therefore cut into tiles; of each it is remembered which segments of a path came near and
+area is therefore cut into tiles; of each it is remembered which bands of a path came near and
 what they left.
 """
 
 from __future__ import annotations
-
-from itertools import pairwise
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely import MultiPolygon
 
+from polepilot.core.planning.bands import Bands, bands_of
 from polepilot.core.planning.footprint import Footprint
-from polepilot.core.planning.swept import few_corners, swept_by
 
 Points = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 CHORD = 0.001
 """How exactly arcs of paths are taken, metres."""
@@ -25,6 +24,8 @@ _TILE = 10.0
 """Side of a tile in tool widths, at most; more where the area is kilometres long."""
 _GRID = 1e-6
 """Corners of what is left of a tile lie on a grid so fine that neighbours fit, metres."""
+_SAME = 1e-6
+"""Bands whose keys differ by less than this are the same."""
 _MOST_TILES = 1000
 """So many in a row at most."""
 _POLYGON = 3
@@ -41,9 +42,9 @@ class Target:
         x0, y0, x1, y1 = area.bounds
         side = max(_TILE * tool, (x1 - x0 + y1 - y0) / _MOST_TILES)
         self._tiles = np.array(_tiles(area, side), dtype=object)
-        low, high = np.hsplit(shapely.bounds(self._tiles).reshape(-1, 4), 2)
+        self._low, self._high = np.hsplit(shapely.bounds(self._tiles).reshape(-1, 4), 2)
         grow = tool / 2 + 1e-6
-        boxes = shapely.box(*(low - grow).T, *(high + grow).T)
+        boxes = shapely.box(*(self._low - grow).T, *(self._high + grow).T)
         self._tree = shapely.STRtree(boxes)
         self._error = error
         self._round = Footprint(tool / 2, error).quadrant
@@ -68,61 +69,29 @@ class Target:
         """What the lines leave of each tile."""
         if not lines or not len(self._tiles):
             return self._tiles
-        rows = np.vstack([_rows(line, self._error) for line in lines])
-        rows = rows[np.lexsort(rows.T)]  # the same ones in any order leave the same
-        pairs = shapely.linestrings(rows[:, :4].reshape(-1, 2, 2))
-        found, tiles = self._tree.query(pairs, predicate="intersects")
-        order = np.lexsort((found, tiles))
-        found, tiles = found[order], tiles[order]
-        bounds = np.r_[0, np.flatnonzero(np.diff(tiles)) + 1, len(tiles)].tolist()
+        bands = bands_of(lines, self.tool / 2, self._round, self._error)
+        found, tiles = self._tree.query(bands.tracks, predicate="intersects")
+        keys = np.floor(bands.keys_near(found, self._low[tiles], self._high[tiles]) / _SAME + 0.3)
+        order = np.lexsort((*keys.T, tiles))  # the same ones in any order leave the same
+        found, tiles, keys = found[order], tiles[order], keys[order]
         left = self._tiles.copy()
-        new: list[tuple[tuple[int, bytes], NDArray[np.intp]]] = []
-        for first, last in pairwise(bounds if len(tiles) else []):
-            tile, near = int(tiles[first]), found[first:last]
-            key = tile, rows[near].tobytes()
-            if key in self._known:
-                left[tile] = self._known[key]
-            else:
-                new.append((key, near))
-        if not new:
-            return left
-        needed = np.unique(np.concatenate([near for _, near in new]))
-        pieces = np.empty(len(rows), dtype=object)
-        pieces[needed] = _pieces(rows[needed], self.tool / 2, self._round)
-        for key, near in new:
-            left[key[0]] = self._known[key] = self._without(key[0], rows[near], pieces[near])
+        for near in np.split(np.arange(len(tiles)), np.flatnonzero(np.diff(tiles)) + 1):
+            if len(near):
+                tile, key = int(tiles[near[0]]), keys[near].tobytes()
+                if (tile, key) not in self._known:
+                    self._known[tile, key] = self._without(tile, bands, found[near])
+                left[tile] = self._known[tile, key]
         return left
 
-    def _without(self, tile: int, rows: Points, pieces: NDArray[np.object_]) -> shapely.Geometry:
-        """A tile without what is swept along some rows."""
+    def _without(self, tile: int, bands: Bands, near: Indices) -> shapely.Geometry:
+        """A tile without what is swept by some bands."""
         try:
-            left = shapely.difference(self._tiles[tile], shapely.union_all(pieces))
+            swept = shapely.union_all(bands.shapes[near])
+            left = shapely.difference(self._tiles[tile], swept)
         except shapely.GEOSException:  # corners nearly coincide; whole capsules have none in common
-            lines = shapely.linestrings(rows[:, :4].reshape(-1, 2, 2))
-            capsules = shapely.buffer(lines, self.tool / 2, quad_segs=self._round)
-            left = shapely.difference(self._tiles[tile], shapely.union_all(capsules))
+            swept = shapely.union_all(bands.capsules(near, self._round))
+            left = shapely.difference(self._tiles[tile], swept)
         return shapely.set_precision(left, _GRID)
-
-
-def _rows(line: Points, error: float) -> Points:
-    """A row per segment of a line: its ends and the point after it, which is NaN at the line's end.
-
-    First a segment of no length for the disc at the beginning.
-    """
-    line = line[np.r_[True, np.hypot(*np.diff(line, axis=0).T) > 1e-9]]
-    line = line[few_corners(line, error)]
-    after = np.vstack([line[2:], np.full((1, 2), np.nan)])
-    ends = np.hstack([line[[0, -1]], line[[0, -1]], np.full((2, 2), np.nan)])
-    return np.vstack([ends, np.hstack([line[:-1], line[1:], after[: len(line) - 1]])])
-
-
-def _pieces(rows: Points, radius: float, quad_segs: int) -> NDArray[np.object_]:
-    """What is swept along each row: a disc at an end of a line, else a rectangle and a sector."""
-    ends = (rows[:, :2] == rows[:, 2:4]).all(axis=1)
-    pieces = np.empty(len(rows), dtype=object)
-    pieces[ends] = shapely.buffer(shapely.points(rows[ends, :2]), radius, quad_segs=quad_segs)
-    pieces[~ends] = swept_by(rows[~ends], radius, quad_segs)
-    return pieces
 
 
 def _tiles(shape: shapely.Geometry, side: float) -> list[shapely.Geometry]:

@@ -3,8 +3,8 @@
     d value / dt = (told - value) / lag,    but at most 1 / slowness
 
 A hobby servo needs 0.1 to 0.2 s for 60 degrees, whatever its lag: in a turn from lock to lock that
-is some degrees of heading. Along with the value go its derivatives by both constants, from which
-a filter learns them.
+is some degrees of heading. Along with the value goes its derivative by the lag, from which a filter
+learns it.
 """
 
 from __future__ import annotations
@@ -14,13 +14,11 @@ from typing import NamedTuple
 
 
 class Followed(NamedTuple):
-    """What has been reached, and how that depends on the two constants."""
+    """What has been reached, and how that depends on the lag."""
 
     value: float
     by_lag: float = 0.0
     """Per second of the lag."""
-    by_slowness: float = 0.0
-    """Per second that is needed for one unit."""
 
 
 def follow(told: float, start: Followed, age: float, lag: float, slowness: float) -> Followed:
@@ -28,16 +26,16 @@ def follow(told: float, start: Followed, age: float, lag: float, slowness: float
 
     Args:
         told: to be reached.
-        start: where it was, and its derivatives there.
+        start: where it was, and its derivative there.
         age: seconds.
         lag: time constant, seconds.
         slowness: least seconds per unit; 0 is as fast as the lag allows.
     """
-    value, by_lag, by_slowness = start
+    value, by_lag = start
     left = told - value
     if lag == 0.0:
         return Followed(told)
-    if left == 0.0 and by_lag == 0.0 and by_slowness == 0.0:
+    if left == 0.0 and by_lag == 0.0:
         return start
     way = 1.0 if left > 0.0 else -1.0
     # At full speed until what is left would be done more slowly anyway.
@@ -45,16 +43,13 @@ def follow(told: float, start: Followed, age: float, lag: float, slowness: float
     if full <= 0.0:
         share = age / lag
         kept = math.exp(-share)
-        return Followed(
-            told - left * kept, (by_lag - left * share / lag) * kept, by_slowness * kept
-        )
+        return Followed(told - left * kept, (by_lag - left * share / lag) * kept)
     if age <= full:
-        return Followed(value + way * age / slowness, by_lag, by_slowness - way * age / slowness**2)
-    # What is left then is lag / slowness; both that and the moment depend on the constants.
+        return Followed(value + way * age / slowness, by_lag)
+    # What is left then is lag / slowness; both that and the moment depend on the lag.
     rest = way * lag / slowness * math.exp((full - age) / lag)
     longer = way * slowness / lag
     return Followed(
         told - rest,
         rest * (longer * by_lag - 1.0 / lag - (age - way * left * slowness) / lag**2),
-        rest * (longer * by_slowness + 1.0 / slowness - way * left / lag),
     )

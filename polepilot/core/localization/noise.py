@@ -23,7 +23,7 @@ class NoiseModel:
     steering_noise: float = math.radians(0.2)
     servo_lag_prior: float = 0.06
     motor_lag_prior: float = 0.05
-    slowness_prior: float = 0.12
+    slowness_prior: float = 0.20
     """Of the time that the servo needs for a radian, seconds."""
     servo_doubt: float = 0.08
     """Density of the modelled wheel angle's error while the servo is on its way, as a share of

@@ -26,6 +26,10 @@ from polepilot.core.observation import Odometry
 
 _SMALL_TURN = 1e-3
 """Below half of this turn (rad) series are used, whose error is then under 1e-13."""
+_SLOWER = 0.15
+"""How much slower (s/rad) the servo is with which the one believed in is compared. A derivative
+would be zero wherever the servo is believed to be fast enough not to matter, and nothing would
+ever tell that it is not."""
 
 
 class Arc(NamedTuple):
@@ -113,7 +117,7 @@ class Step(NamedTuple):
     speed_by_lag: float = 0.0
     """Derivative of ``speed`` by the motors' time constant, m/s²."""
     by_slowness: float = 0.0
-    """Derivative of ``steering`` by the servo's slowness, rad²/s."""
+    """By how much ``steering`` differs for a slower servo, per s/rad that it is slower."""
 
 
 class Following(NamedTuple):
@@ -138,6 +142,8 @@ class _Entry(NamedTuple):
     speed_then: Followed
     """What the motors did at ``stamp``, while on the way to ``speed``."""
     steering_then: Followed
+    slower_then: Followed
+    """What a slower servo did."""
 
 
 class OdometryHistory:
@@ -177,7 +183,8 @@ class OdometryHistory:
         if not (math.isfinite(stamp) and math.isfinite(speed) and math.isfinite(steering)):
             return
         if not self._entries:
-            self._push(_Entry(stamp, speed, steering, Followed(speed), Followed(steering)))
+            then = Followed(speed), Followed(steering), Followed(steering)
+            self._push(_Entry(stamp, speed, steering, *then))
             return
         last = self._entries[-1]
         if stamp < last.stamp:
@@ -256,7 +263,7 @@ class OdometryHistory:
         if dt <= 0:
             return
         for index in range(count):
-            speed, steering = self._values(entry, start + (index + 0.5) * dt)
+            speed, steering, slower = self._values(entry, start + (index + 0.5) * dt)
             if abs(speed.value) < 1e-4:
                 yield Step(dt, 0.0, steering.value, 0.0)
                 continue
@@ -268,14 +275,17 @@ class OdometryHistory:
                 steering.by_lag,
                 abs(entry.speed - speed.value),
                 speed.by_lag,
-                steering.by_slowness,
+                (slower.value - steering.value) / _SLOWER,
             )
 
-    def _values(self, entry: _Entry, stamp: float) -> tuple[Followed, Followed]:
-        """What motors and servo had reached at ``stamp``."""
+    def _values(self, entry: _Entry, stamp: float) -> tuple[Followed, Followed, Followed]:
+        """What motors, servo and a slower servo had reached at ``stamp``."""
         age = stamp - entry.stamp
         motor, servo, slowness = self._following
-        return (
-            follow(entry.speed, entry.speed_then, age, motor, 0.0),
-            follow(entry.steering, entry.steering_then, age, servo, slowness),
-        )
+        speed = follow(entry.speed, entry.speed_then, age, motor, 0.0)
+        then, slower = entry.steering_then, entry.slower_then
+        steering = follow(entry.steering, then, age, servo, slowness)
+        slowness += _SLOWER
+        if slower == then and abs(entry.steering - then.value) * slowness <= servo:
+            return speed, steering, steering
+        return speed, steering, follow(entry.steering, slower, age, servo, slowness)

@@ -29,7 +29,7 @@ class LocalizerSettings:
     """Time constant of the steering servo, seconds; the EKF learns the true one."""
     speed_lag: float = 0.04
     """Time constant of the motors, likewise."""
-    steering_slowness: float = 0.15
+    steering_slowness: float = 0.22
     """Seconds that the servo needs for a radian at least, likewise."""
     late: float = 1.0
     """Measurements that come at most so many seconds late are applied in their place."""

@@ -25,7 +25,7 @@ from polepilot.core.observation import RangeBearing
 Sighting = tuple[RangeBearing, Landmark]
 _KEPT = 24
 """So many pictures can be gone back at most."""
-_STEP = 0.01
+_STEPS = Following(0.01, 0.01, 0.05)
 """The constants of motors and servo are followed in steps of this, and within these limits."""
 _LEAST, _MOST = Following(0.01, 0.01, 0.08), Following(0.5, 0.5, 1.0)
 
@@ -120,7 +120,8 @@ class Track:
     def retune(self, history: OdometryHistory) -> None:
         """Let the history follow what the filter has learnt of servo and motors."""
         errors = self.filter.following_errors
-        if max(errors) < _STEP and min(errors) > -_STEP:
+        motor, servo, slowness = errors
+        if abs(motor) < _STEPS[0] and abs(servo) < _STEPS[1] and abs(slowness) < _STEPS[2]:
             return
         before = history.following
         after = Following(
@@ -130,11 +131,10 @@ class Track:
             )
         )
         by = Following(*(new - old for new, old in zip(after, before, strict=True)))
-        if any(abs(change) > 0.5 * _STEP for change in by):
+        if any(abs(change) > 0.5 * step for change, step in zip(by, _STEPS, strict=True)):
             history.retune(after)
-            self.filter.retuned(by)
-            # What was kept belongs to the old constants.
-            self._moments.clear()
+            for filtered in (self.filter, *(moment.filter for moment in self._moments)):
+                filtered.retuned(by)
 
     def rewind(self, stamp: float, history: OdometryHistory) -> list[_Moment] | None:
         """Go back to ``stamp``; answers what was applied since, or None where that is too far."""

@@ -13,15 +13,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from operator import mul
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from polepilot.core.geometry import Pose2D, wrap_angle
+from polepilot.core.geometry import Point, Pose2D, wrap_angle
 from polepilot.core.landmark import Landmark
 from polepilot.core.localization.fix import Fix
+from polepilot.core.localization.health import place_of
 from polepilot.core.localization.noise import NoiseModel
 from polepilot.core.localization.odometry import Following, OdometryHistory, Step
 from polepilot.core.localization.stretch import Distortions, drive
@@ -227,8 +229,7 @@ class PoseFilter:
         distance = max(math.hypot(dx, dy), 1e-3)
         ux, uy = dx / distance, dy / distance
         tx, ty = uy / distance, -ux / distance
-        pan = measurement.bearing if measurement.pan is None else measurement.pan
-        shapes = _legendre(min(max(pan / noise.pan_range, -1.0), 1.0))
+        shapes = self._shapes(measurement)
         jacobian = np.zeros((2, len(self.state)))
         jacobian[:, :3] = (
             (-ux * scale, -uy * scale, (ux * arm_y - uy * arm_x) * scale),
@@ -258,6 +259,21 @@ class PoseFilter:
             a * d - b * b
         )
         return Innovation(range_gap, bearing_gap, distance, squared, jacobian, (a, b, d), cross)
+
+    def _shapes(self, measurement: RangeBearing) -> list[float]:
+        """The Legendre polynomials where the camera pointed."""
+        pan = measurement.bearing if measurement.pan is None else measurement.pan
+        return _legendre(min(max(pan / self.noise.pan_range, -1.0), 1.0))
+
+    def appears(self, measurement: RangeBearing) -> Point | None:
+        """Where in `map` a landmark appears, by all that is known of what distorts measurements.
+
+        None without a range.
+        """
+        scale, *bends = self.state[RANGE:STATES].tolist()
+        bearing = measurement.bearing - sum(map(mul, self._shapes(measurement), bends))
+        true = replace(measurement, range=measurement.range / (1.0 + scale), bearing=bearing)
+        return place_of(self.pose, true, self.camera_forward)
 
     def take(
         self, measurement: RangeBearing, landmark: Landmark, tolerance: float

@@ -26,7 +26,8 @@ _SPAN = 2.0
 """Seconds between the first and the last of them: more than one pass of the camera."""
 _MEMORY = 60.0
 _SCATTER = 0.12
-"""How well they must agree on the new place, metres."""
+"""How well they must agree on the new place, metres, or in standard deviations of both."""
+_SIGMAS = 2.0
 _SHIFT = 0.12
 _PAUSE = 1.0
 """Seconds between two rows of sightings."""
@@ -112,15 +113,20 @@ class LandmarkHealth:
 
     def _verdict(self, number: int) -> Verdict | None:
         """On what was collected, if that agrees on a new place."""
-        places = self._places[number]
+        places = list(self._places[number])
         points = np.array([point for _, point, _ in places])
-        apart = np.hypot(*(points - np.median(points, axis=0)).T)
-        scatter = float(np.median(apart))
-        near = apart <= max(scatter, _SCATTER)
-        middle = _middle([one for one, taken in zip(places, near, strict=True) if taken])
+        sigmas = np.array([sigma for _, _, sigma in places])
+        apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
+        allowed = np.maximum(_SCATTER, _SIGMAS * np.hypot(sigmas[:, None], sigmas[None]))
+        near = apart <= allowed
+        # Around the one with which most agree; of several, the surest.
+        centre = int(np.lexsort((-sigmas, near.sum(axis=1)))[-1])
+        if 2 * int(near[centre].sum()) <= len(places):
+            return None
+        middle = _middle([places[index] for index in np.flatnonzero(near[centre])])
         mark = self.landmarks[number]
         dx, dy = middle[0] - mark.x, middle[1] - mark.y
-        if scatter > _SCATTER or math.hypot(dx, dy) < _SHIFT:
+        if math.hypot(dx, dy) < _SHIFT:
             return None
         self._places.pop(number)
         if self.stands_another(number, middle):

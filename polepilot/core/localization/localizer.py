@@ -22,7 +22,7 @@ from polepilot.core.localization.ekf import PoseFilter
 from polepilot.core.localization.events import EventLog
 from polepilot.core.localization.events import LocalizerEvent as LocalizerEvent
 from polepilot.core.localization.fix import Fix
-from polepilot.core.localization.health import LandmarkHealth, Verdict, place_of
+from polepilot.core.localization.health import LandmarkHealth, Verdict
 from polepilot.core.localization.noise import NoiseModel as NoiseModel
 from polepilot.core.localization.odometry import Following, OdometryHistory
 from polepilot.core.localization.presence import Presence
@@ -385,16 +385,16 @@ class Localizer:
         mark = self._landmarks[number]
         settings, health = self.settings, self._health
         if number in health.moved:
-            place = place_of(track.filter.pose, measurement, self._camera_forward)
+            place = track.filter.appears(measurement)
             if place is None or math.dist(place, mark.position) > 0.5 * settings.tolerance:
                 health.contradicted(number, stamp, place or (math.nan, math.nan))
             elif health.agreed(number):
                 text = f"Landmark {number} stands again where the map has it."
                 self._events.add(LocalizerEvent(stamp, "landmark_back", text, number))
             return False
-        place = place_of(track.filter.pose, measurement, self._camera_forward)
+        place = track.filter.appears(measurement) if health.suspected(number, stamp) else None
         off = 0.0 if place is None else math.dist(place, mark.position)
-        if off > 0.5 * settings.tolerance and health.suspected(number, stamp):
+        if off > 0.5 * settings.tolerance:
             # A pose that has become vague since must not make room for it.
             taken, gap = False, off
         else:
@@ -408,6 +408,7 @@ class Localizer:
                     self._tell(verdict, stamp)
             self._seen(track, measurement)
             return True
+        place = place or track.filter.appears(measurement)
         offset = (None, None) if place is None else (place[0] - mark.x, place[1] - mark.y)
         text = f"Landmark {number} appears {100 * gap:.0f} cm from where it should be."
         self._events.report(LocalizerEvent(stamp, "rejected", text, number, *offset))
@@ -425,8 +426,7 @@ class Localizer:
 
     def _contradicted(self, number: int, stamp: float, place: Point, sigma: float) -> None:
         """A landmark is not in its place though the pose is right: is it to be left out?"""
-        verdict = self._health.contradicted(number, stamp, place, sigma)
-        if verdict is not None:
+        if (verdict := self._health.contradicted(number, stamp, place, sigma)) is not None:
             self._tell(verdict, stamp)
 
     def _tell(self, verdict: Verdict, stamp: float) -> None:

@@ -17,9 +17,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from polepilot.core.geometry import Pose2D, wrap_angle
+from polepilot.core.geometry import Point, Pose2D, wrap_angle
 from polepilot.core.landmark import Landmark
 from polepilot.core.localization.fix import Fix
+from polepilot.core.localization.health import place_of
 from polepilot.core.localization.kalman import AxisFilter
 from polepilot.core.localization.odometry import (
     NO_LAGS,
@@ -157,6 +158,10 @@ class RadialFilter:
             return False, gap
         self.update(measurement, landmark)
         return True, gap
+
+    def appears(self, measurement: RangeBearing) -> Point | None:
+        """Where in `map` a landmark appears; None without a range."""
+        return place_of(self.pose, measurement, self.camera_forward)
 
     def update(self, measurement: RangeBearing, landmark: Landmark) -> None:
         """R_2^2 and R_2^3 from one range."""

@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from polepilot.core.geometry import Pose2D
+from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.landmark import Landmark
 from polepilot.core.localization.doubt import largest_sigma
 from polepilot.core.localization.fix import Fix
@@ -53,6 +53,7 @@ class Filter(Protocol):
     def take(
         self, measurement: RangeBearing, landmark: Landmark, tolerance: float
     ) -> tuple[bool, float]: ...
+    def appears(self, measurement: RangeBearing) -> Point | None: ...
     def copy(self) -> Filter: ...
 
 

@@ -51,6 +51,16 @@ def test_the_surer_sightings_count_more() -> None:
     assert verdict.dx == pytest.approx(0.32, abs=0.01)
 
 
+def test_a_sure_sighting_stands_against_many_vague_ones() -> None:
+    """They come from a pose whose heading was off, and that said so."""
+    health = LandmarkHealth(MARKS)
+    for index in range(5):
+        assert health.contradicted(1, 0.1 * index, (5.45, 0.28), 0.10) is None
+    verdict = health.contradicted(1, 9.0, (5.30, 0.20), 0.02)
+    assert verdict is not None
+    assert (verdict.dx, verdict.dy) == pytest.approx((0.3, 0.2), abs=0.02)
+
+
 def test_places_that_disagree_are_no_new_place() -> None:
     health = LandmarkHealth(MARKS)
     for index in range(12):

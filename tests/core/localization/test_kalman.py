@@ -110,6 +110,16 @@ def test_the_measurement_jacobian_matches_differences(surveyed: tuple[int, ...])
         assert innovation.jacobian[:, column] == pytest.approx(numeric, abs=1e-6)
 
 
+def test_a_landmark_appears_where_it_stands_once_distortions_are_known() -> None:
+    tracked = fresh(Pose2D(2.0, 1.0, 0.7))
+    tracked.state[3:] = np.random.default_rng(3).normal(0, 0.01, STATES - 3)
+    exact = measure(tracked.state, 0.5)
+    seen = RangeBearing(0.0, 1, *exact, 0.02, 0.001, pan=0.5)
+    assert tracked.appears(seen) == pytest.approx(MARK.position)
+    blind = RangeBearing(0.0, 1, math.inf, exact[1], math.inf, 0.001, pan=0.5)
+    assert tracked.appears(blind) is None
+
+
 def test_the_update_is_the_textbook_one() -> None:
     tracked = fresh(Pose2D(2.0, 1.0, 0.7))
     seen = RangeBearing(0.0, 1, 4.4, 0.1, 0.02, 0.001, pan=0.1)

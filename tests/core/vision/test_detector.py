@@ -303,6 +303,31 @@ def test_an_end_bar_is_paint_and_ends(number: int, unit: int) -> None:
     assert ALL.detect(post(code, unit, unit, board=True, bars=False)) == [], "stripes on a board"
 
 
+def stripes(code: str, unit: int, seed: int, fainter: float) -> Image:
+    """Stripes across a board, a pole's width of them in full colour, the rest ``fainter``."""
+    grey, image = np.array((150.0, 155.0, 160.0)), np.full((300, 400, 3), (150.0, 155.0, 160.0))
+    across = np.abs(np.arange(400) - 200.0) / (0.7 * unit)
+    places = np.floor((np.arange(300) - (150 - len(code) * unit / 2)) / unit).astype(int)
+    for row, place in enumerate(places):
+        if 0 <= place < len(code):
+            paint = np.array((40.0, 120.0, 235.0) if code[place] == "1" else (20.0, 20.0, 20.0))
+            image[row, across <= 3.5] = paint + fainter * (grey - paint)
+            image[row, across <= 1] = paint
+    image = np.asarray(cv2.GaussianBlur(image, (0, 0), 0.6))
+    image += np.random.default_rng(seed).normal(0, 1.2, image.shape)
+    return np.clip(image, 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("unit", [3, 4, 6, 10])
+def test_a_pole_hides_what_is_behind_it(unit: int) -> None:
+    """What goes on beside a strip as it does on it is a pattern, and no pole."""
+    for number in range(1, 16):
+        code = encode(number, 4)
+        assert only(stripes(code, unit, unit, 1.0)).id == number
+        for fainter in (0.0, 0.1, 0.2):
+            assert ALL.detect(stripes(code, unit, unit, fainter)) == []
+
+
 def test_a_grey_ladder_is_no_landmark() -> None:
     look = Look(bright=(0.6, 0.6, 0.6))
     assert ALL.detect(picture([pole(13, 3.0, 0.0)], look=look)) == []

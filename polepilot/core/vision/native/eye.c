@@ -17,6 +17,10 @@
 #define USUAL_SHARP_TINT 0.28  /* and where colour is blurred: beside the strip and between its segments */
 #define USUAL_SIGMA 0.0040      /* of the unit, as a share of it */
 #define USUAL_DOUBT 0.35        /* rest of an end bar as paint, over its rest as what is behind it */
+#define LEAST_APART 1.4         /* of bright - dark, from what is beside it: what is missing is a */
+#define USUAL_APART 0.3         /* misfit, in this, */
+#define MISFIT_APART 3.0        /* and what is more makes up for so much of one, */
+#define MOST_APART 2.0          /* up to this much */
 #define SURE 6e-4              /* share of the unit: no second fit makes it better */
 #define SHARP 5.0              /* rows per segment: blurred colour still parts them */
 #define NEAR 7.5               /* rows per segment: from here on strips fit well, */
@@ -216,6 +220,11 @@ static int examine(const eye_picture *picture, const eye_task *task,
     double away = picture->rows / 2.0 - upright.bright_row;
     out->column_sigma = hypot(side.sigma, upright.lean_sigma * away);
     double off = misfit(out, task->constant, sharp), most = most_misfit(out);
+    double apart = eye_apart(picture, &upright, &scale, &side, out->code, segments) - LEAST_APART;
+    if (apart < 0)
+        off += apart * apart / (USUAL_APART * USUAL_APART);
+    else
+        most += MISFIT_APART * fmin(apart, MOST_APART);
     if (!(off <= most)) /* or no number */
         return EYE_POOR_FIT;
     doubt /= USUAL_DOUBT;

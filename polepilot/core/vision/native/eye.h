@@ -15,6 +15,7 @@
  *   ends.c     whether the end bars are there, and end
  *   cover.c    whether something dark lies over it
  *   front.c    what else speaks for something in front of a bit
+ *   apart.c    how much the strip stands out from what is beside it
  * eye.c runs them; internal.h is what they share. Rows and columns count from the centre of the
  * first pixel. Light is linear, 0 to 1. docs/vision.md explains the method. */
 #ifndef POLEPILOT_EYE_H

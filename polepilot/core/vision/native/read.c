@@ -7,8 +7,8 @@
 
 #include <math.h>
 
-#define TOLERANCE 0.30     /* of the distance between bright and dark */
-#define DARK_TOLERANCE 0.18
+#define TOLERANCE 0.36     /* of the distance between bright and dark */
+#define DARK_TOLERANCE 0.24
 #define OPEN_TOLERANCE 0.14
 #define MOST_TOLERANCE 0.45
 #define DARKEST_SHARE 0.45 /* of the bright paint's light that black gives back (haze, glare) */

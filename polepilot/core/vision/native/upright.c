@@ -10,6 +10,7 @@
 
 #define LARGEST 1e6     /* pixels; no strip is larger, nor could its columns be counted with an int */
 #define MARGIN 1.3      /* segments above and below the code that are kept */
+#define UNSURE 3.0      /* rows per segment below which a steeper one is taken for upright */
 #define STEEPEST 0.118  /* columns per row: 60 degrees/s, a slow shutter and 2 degrees of roll */
 #define MOST_LEANS 12   /* that are tried to either side at first */
 #define ROUNDS 2        /* of parabolas after that */
@@ -370,9 +371,9 @@ int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candida
     cap_signal(bands, n, columns, (int)lround((c->column - across_first) / step));
     double lean = find_lean(bands, n, columns, step, row, length, wide > 2 ? wide : 2, sharp);
     if (fabs(lean) > STEEPEST) {
-        if (!sharp)
+        if (!sharp && unit > UNSURE)
             return EYE_LEANS;
-        lean = 0; /* what stands beside a far one pulls at its brightness */
+        lean = 0; /* what stands beside a far one pulls at it, and so does noise */
     }
     difference(bands, n, columns, step, row, lean, 0, sharp, out->across);
     for (int i = 0; i < columns; i++)

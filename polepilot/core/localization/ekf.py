@@ -156,8 +156,9 @@ class PoseFilter:
             return MapMisfit()
         unit = self.noise.survey_sigma**2
         freedom = len(shifts) - float(self.covariance.diagonal()[STATES:].sum()) / unit
-        misfit = MapMisfit(float(shifts @ shifts) / unit, freedom)
-        if not misfit.improbable:
+        stretch = float(self.state[RANGE]) / self.noise.range_prior
+        misfit = MapMisfit(float(shifts @ shifts) / unit, freedom, None, stretch)
+        if not misfit.worth_a_word:
             return misfit
         worst = STATES + 2 * (int(np.abs(shifts).argmax()) // 2)
         number = next(k for k, place in self._places.items() if place == worst)

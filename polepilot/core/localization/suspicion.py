@@ -20,8 +20,12 @@ _FEWEST = 3
 """So many landmarks that agree say which one does not."""
 _TIMES, _WITHIN = 3, 60.0
 """So often within so many seconds is more than chance."""
-_SIGMAS = 4.0
-"""The map's errors may be so many standard deviations of their sum of squares above its mean."""
+_STRETCH = 2.0
+"""Standard deviations of the error of all ranges that need more than three landmarks to be told
+from an error of the map."""
+_SIGMAS, _CALM = 3.0, 1.0
+"""The map's errors may be so many standard deviations of their sum of squares above its mean; once
+they were not, they have to come back to so many."""
 
 
 class MapMisfit(NamedTuple):
@@ -32,11 +36,18 @@ class MapMisfit(NamedTuple):
     freedom: float = 0.0
     """What that sum should be: how many of these errors the measurements have told so far."""
     worst: int | None = None
-    """The landmark that was moved most."""
+    """The landmark that was moved most, where that is worth a word."""
+    stretch: float = 0.0
+    """By how much all ranges had to be changed, in standard deviations."""
 
     @property
-    def improbable(self) -> bool:
-        return self.squares > self.freedom + _SIGMAS * math.sqrt(2.0 * max(self.freedom, 1.0))
+    def excess(self) -> float:
+        """In standard deviations of that sum."""
+        return (self.squares - self.freedom) / math.sqrt(2.0 * max(self.freedom, 1.0))
+
+    @property
+    def worth_a_word(self) -> bool:
+        return self.excess > _CALM
 
 
 class Suspected(NamedTuple):
@@ -53,6 +64,8 @@ class Suspicion:
     tolerance: float
     """Metres by which a landmark may appear off its place."""
     _losses: deque[float] = field(default_factory=lambda: deque(maxlen=_TIMES))
+    _map: bool = False
+    """The map was improbable, and is not yet probable again."""
 
     def lost(self, stamp: float) -> None:
         """The pose was given up."""
@@ -68,6 +81,7 @@ class Suspicion:
             moved: those found displaced, and by how much.
             misfit: of the map, by the filter.
         """
+        self._map = misfit.excess > (_CALM if self._map else _SIGMAS)
         if moved and landmarks - len(moved) < _FEWEST:
             number = next(iter(moved))
             return Suspected(
@@ -75,10 +89,16 @@ class Suspicion:
                 "it cannot be told which one has been moved.",
                 max(math.hypot(*shift) for shift in moved.values()),
             )
-        if misfit.improbable:
+        if self._map:
             return Suspected(
                 "The landmarks do not stand to each other as on the map, most of all landmark "
                 f"{misfit.worst}: check the map.",
+                0.5 * self.tolerance,
+            )
+        if abs(misfit.stretch) > _STRETCH and landmarks - len(moved) <= _FEWEST:
+            return Suspected(
+                "The landmarks stand closer together or farther apart than on the map: one of them "
+                "is not in its place, or the camera's calibration is off.",
                 0.5 * self.tolerance,
             )
         if len(self._losses) == _TIMES and stamp - self._losses[0] < _WITHIN:

@@ -29,6 +29,25 @@ def test_nothing_is_suspected_of_a_right_pose() -> None:
     assert suspicion.judge(10.0, 6, {4: (0.3, 0.2)}, MapMisfit()).reason == ""
 
 
+def test_an_improbable_map_is_suspected_until_it_is_probable_again() -> None:
+    suspicion = Suspicion(0.2)
+    reasons = [
+        suspicion.judge(10.0, 6, {}, MapMisfit(8.0 + 4.0 * sigmas, 8.0, 1)).reason
+        for sigmas in (0.0, 2.9, 3.1, 2.0, 0.9, 2.0)
+    ]
+    assert [bool(reason) for reason in reasons] == [False, False, True, True, False, False]
+    assert "landmark 1: check the map" in reasons[2]
+
+
+def test_three_landmarks_farther_apart_than_on_the_map_are_suspected() -> None:
+    """Of four and more the filter can tell whether all ranges are off or one landmark is."""
+    stretched = MapMisfit(4.0, 4.0, None, -2.4)
+    assert "closer together" in Suspicion(0.2).judge(10.0, 3, {}, stretched).reason
+    assert "closer together" in Suspicion(0.2).judge(10.0, 4, {2: (0.3, 0.0)}, stretched).reason
+    assert Suspicion(0.2).judge(10.0, 4, {}, stretched).reason == ""
+    assert Suspicion(0.2).judge(10.0, 3, {}, MapMisfit(4.0, 4.0, None, 1.5)).reason == ""
+
+
 def test_two_cannot_say_which_of_three_was_moved() -> None:
     suspected = Suspicion(0.2).judge(10.0, 3, {7: (0.09, -0.12)}, MapMisfit())
     assert "Landmark 7" in suspected.reason
@@ -62,8 +81,8 @@ def test_the_filter_knows_what_its_map_has_cost(seed: int) -> None:
         misfits[off] = tracked.map_misfit
     right, wrong = misfits[0.005], misfits[0.05]
     assert 0.5 < right.freedom < 6.0
-    assert not right.improbable
-    assert wrong.improbable
+    assert right.excess < 3.0
+    assert wrong.excess > 3.0
     shifts = np.hypot(*tracked.state[STATES:].reshape(3, 2).T)
     assert wrong.worst is not None
     assert shifts[wrong.worst - 1] == shifts.max()

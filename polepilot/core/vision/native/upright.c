@@ -10,7 +10,8 @@
 
 #define LARGEST 1e6     /* pixels; no strip is larger, nor could its columns be counted with an int */
 #define MARGIN 1.3      /* segments above and below the code that are kept */
-#define UNSURE 3.0      /* rows per segment below which a steeper one is taken for upright */
+#define UNSURE 3.0      /* rows per segment below which a steeper one is taken for upright, */
+#define UPRIGHT 0.95    /* if it stands out so much then, of how it does with its lean */
 #define STEEPEST 0.118  /* columns per row: 60 degrees/s, a slow shutter and 2 degrees of roll */
 #define MOST_LEANS 12   /* that are tried to either side at first */
 #define ROUNDS 2        /* of parabolas after that */
@@ -163,9 +164,10 @@ static double energy(const float *values, int n)
     return sum;
 }
 
-/* The lean under which the difference stands out most. */
+/* The lean under which the difference stands out most; ``stands``: how much it stands out without
+ * one, as a share of that. */
 static double find_lean(const band *bands, int n, int columns, int step, double row, double length,
-                        double wide, int sharp)
+                        double wide, int sharp, double *stands)
 {
     float values[EYE_MOST_COLUMNS];
     double best = -1, best_lean = 0;
@@ -177,11 +179,14 @@ static double find_lean(const band *bands, int n, int columns, int step, double 
         double lean = i * apart;
         difference(bands, n, columns, step, row, lean, 0, sharp, values);
         double e = energy(values, columns);
+        if (i == 0)
+            *stands = e;
         if (e > best) {
             best = e;
             best_lean = lean;
         }
     }
+    *stands = best > 0 ? *stands / best : 0;
     for (int round = 0; round < ROUNDS; round++) {
         /* A parabola through three energies has its top at the best lean. */
         double e[3];
@@ -369,9 +374,10 @@ int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candida
     know_lean(bands, n, bands[0].weight > 0 && bands[n - 1].weight > 0, wide, out);
     double across_first = first + (step - 1) / 2.0;
     cap_signal(bands, n, columns, (int)lround((c->column - across_first) / step));
-    double lean = find_lean(bands, n, columns, step, row, length, wide > 2 ? wide : 2, sharp);
+    double stands = 0, lean = find_lean(bands, n, columns, step, row, length, wide > 2 ? wide : 2,
+                                        sharp, &stands);
     if (fabs(lean) > STEEPEST) {
-        if (!sharp && unit > UNSURE)
+        if (!sharp && (unit > UNSURE || stands < UPRIGHT))
             return EYE_LEANS;
         lean = 0; /* what stands beside a far one pulls at it, and so does noise */
     }

@@ -292,6 +292,20 @@ def figures(readings: Iterable[Reading]) -> dict[str, Any]:
     return out
 
 
+CAMERAS = ("sharp", "jpeg", "mosaic")
+"""What has become of colour: a larger picture was averaged down; JPEG kept one colour for four
+pixels; the sensor had one colour for every pixel of this very picture."""
+
+
+def camera_of(note: str) -> str:
+    """Which of `CAMERAS` took a picture, by the note of either program."""
+    if "native sensor" in note or "mosaic" in note:
+        return "mosaic"
+    if "sensor" in note:  # the darkroom names only what it has left whole
+        return "sharp" if "jpeg 0" in note or "4:4:4" in note else "jpeg"
+    return "jpeg" if "4:2:0" in note else "sharp"
+
+
 def summary(verdicts: Sequence[Verdict], words: Sequence[str] = ()) -> dict[str, Any]:
     """All figures of a campaign, by family; ``words`` split it by what the notes say."""
     out: dict[str, Any] = {}
@@ -319,6 +333,15 @@ def summary(verdicts: Sequence[Verdict], words: Sequence[str] = ()) -> dict[str,
             row["orange"]["wrong"] = sum(verdict.wrong_orange for verdict in ours)
             row["plain"] = figures(one for one in readings if not one.orange)
             row["plain"]["wrong"] = wrong - row["orange"]["wrong"]
+        row["cameras"] = {
+            camera: figures(
+                reading
+                for verdict in ours
+                for reading in verdict.readings
+                if camera_of(verdict.note) == camera and not reading.orange
+            )
+            for camera in CAMERAS
+        }
         places = sorted({math.floor(one.range / STEP) * STEP for one in readings})
         row["distance"] = {
             f"{low:.0f}-{low + STEP:.0f} m": figures(

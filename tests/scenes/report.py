@@ -19,6 +19,7 @@ from typing import Any
 
 import cv2
 from scenes import final, resolution, table2
+from scenes.campaign import CAMERAS
 from scenes.studio import scene
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -76,6 +77,39 @@ def _cell(line: final.Line, result: final.Result | None, judged: bool = False) -
         failed = judged and figure.met(result) is False
         parts.append("-" if shown is None else f"**{shown}** (missed)" if failed else shown)
     return " / ".join(parts)
+
+
+_TARGETS = (
+    ("clean", "plain rooms, 2-8 m", 99.5),
+    ("clean-8-12", "plain rooms, 8-12 m", 99.5),
+    ("clean-12-16", "plain rooms, 12.5-16 m", 97.0),
+    ("clean-16-22", "plain rooms, 16-22 m", 60.0),
+    ("photo", "photographs, surround not orange", 98.0),
+    ("pan", "panning, surround not orange", 97.0),
+)
+
+
+def _cameras(results: Path) -> str:
+    """How many landmarks are read by what the camera has done to colour, of both programs."""
+    measured = [_load(results, f"{program}-default") for program in ("darkroom", "studio")]
+    rows = []
+    for family, words, target in _TARGETS:
+        cells = [words, f"≥ {target:g} %"]
+        for camera in CAMERAS:
+            found = [one and one[family]["cameras"][camera]["read_percent"] for one in measured]
+            cells.append(
+                " / ".join(
+                    PENDING
+                    if value is None
+                    else f"{value:.2f}"
+                    if value >= target
+                    else f"**{value:.2f}**"
+                    for value in found
+                )
+            )
+        rows.append(cells)
+    head = ["read, darkroom / studio, %", "target", "a larger picture, averaged"]
+    return _rows([*head, "JPEG 4:2:0", "mosaic at this resolution"], rows)
 
 
 def _counts(result: final.Result | None) -> str:
@@ -157,6 +191,7 @@ def _speed(results: Path) -> str:
 TABLES: Mapping[str, Callable[[Path], str]] = {
     "darkroom": _judgement("darkroom"),
     "studio": _judgement("studio"),
+    "cameras": _cameras,
     "table2": _table2,
     "resolution": _resolution,
     "speed": _speed,

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scenes import figures_measuring, figures_seeing, final, resolution, table2
+from scenes.campaign import camera_of as kind_of_camera
 from scenes.drawing import Axes, Drawing
 from scenes.posed import ORANGE, camera_of, posed
 from scenes.report import DOCS, PENDING, TABLES, filled, main
@@ -51,6 +52,19 @@ def campaign(**changes: dict[str, Any]) -> dict[str, Any]:
 def test_the_tables_of_the_page_are_the_measurements() -> None:
     assert filled(PAGE) == PAGE, "PYTHONPATH=tests python -m scenes.report --no-pictures"
     assert set(re.findall(r"<!-- table: ([\w-]+) -->", PAGE)) == set(TABLES)
+
+
+def test_what_a_camera_has_done_to_colour_is_told_by_the_notes_of_both_programs() -> None:
+    said = {
+        "room, blur 0.4, mosaic, jpeg 91 4:2:0": "mosaic",
+        "room, blur 0.4, jpeg 91 4:2:0": "jpeg",
+        "room, blur 0.4, jpeg 91": "sharp",
+        "native sensor, edge, jpeg 0": "mosaic",
+        "double sensor, edge, sharpen 0.0, jpeg 90": "jpeg",
+        "double sensor, edge, sharpen 0.0, jpeg 90 4:4:4": "sharp",
+        "ideal sensor, edge, sharpen 0.0, jpeg 0": "sharp",
+    }
+    assert {note: kind_of_camera(note) for note in said} == said
 
 
 def test_pictures_and_links_of_the_page_are_there_and_small() -> None:

@@ -28,7 +28,8 @@ _MEMORY = 60.0
 _SCATTER = 0.12
 """How well they must agree on the new place, metres, or in standard deviations of both."""
 _SIGMAS = 2.0
-_SHIFT = 0.12
+_SHIFT, _SIGNIFICANT = 0.12, 3.0
+"""A landmark was moved by so many metres, and standard deviations, at least."""
 _PAUSE = 1.0
 """Seconds between two rows of sightings."""
 _SUREST = 0.01
@@ -123,10 +124,10 @@ class LandmarkHealth:
         centre = int(np.lexsort((-sigmas, near.sum(axis=1)))[-1])
         if 2 * int(near[centre].sum()) <= len(places):
             return None
-        middle = _middle([places[index] for index in np.flatnonzero(near[centre])])
+        middle, sigma = _middle([places[index] for index in np.flatnonzero(near[centre])])
         mark = self.landmarks[number]
         dx, dy = middle[0] - mark.x, middle[1] - mark.y
-        if math.hypot(dx, dy) < _SHIFT:
+        if math.hypot(dx, dy) < max(_SHIFT, _SIGNIFICANT * sigma):
             return None
         self._places.pop(number)
         if self.stands_another(number, middle):
@@ -163,8 +164,8 @@ class LandmarkHealth:
         self._places.clear()
 
 
-def _middle(places: Sequence[tuple[float, Point, float]]) -> Point:
-    """Where a landmark stands, by the stamps, places and sigmas of its sightings.
+def _middle(places: Sequence[tuple[float, Point, float]]) -> tuple[Point, float]:
+    """Where a landmark stands and how well that is known, by its sightings.
 
     Sightings in a row share the pose's error, which grows: only the surest of each row count.
     """
@@ -181,4 +182,4 @@ def _middle(places: Sequence[tuple[float, Point, float]]) -> Point:
         y += share * sum(point[1] for point in chosen) / len(chosen)
         weight += share
         row.clear()
-    return x / weight, y / weight
+    return (x / weight, y / weight), 1.0 / math.sqrt(weight)

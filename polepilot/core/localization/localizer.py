@@ -416,11 +416,11 @@ class Localizer:
         misread = place is not None and health.stands_another(number, place)
         if gap > settings.tolerance and not misread:
             self._doubt.add(measurement, gap)
-        reason = "" if misread else self._trial.contradicts(measurement)
-        if reason:
+        if reason := "" if misread else self._trial.contradicts(measurement):
             self._belief.lose(stamp, reason)
         if place is not None and self._others_agree(number, stamp):
-            sigma = math.hypot(track.sigma, measurement.range * track.heading_sigma)
+            aside = math.hypot(track.heading_sigma, measurement.bearing_sigma)
+            sigma = math.hypot(track.sigma, measurement.range * aside, measurement.range_sigma)
             self._contradicted(number, stamp, place, sigma)
         return False
 

@@ -23,7 +23,7 @@ _TIMES, _WITHIN = 3, 60.0
 _STRETCH = 2.0
 """Standard deviations of the error of all ranges that need more than three landmarks to be told
 from an error of the map."""
-_SIGMAS, _CALM = 3.0, 1.0
+_SIGMAS, _CALM = 4.0, 3.0
 """The map's errors may be so many standard deviations of their sum of squares above its mean; once
 they were not, they have to come back to so many."""
 

@@ -61,6 +61,16 @@ def test_a_sure_sighting_stands_against_many_vague_ones() -> None:
     assert (verdict.dx, verdict.dy) == pytest.approx((0.3, 0.2), abs=0.02)
 
 
+def test_a_shift_within_what_is_known_convicts_nobody() -> None:
+    """Far away: ranges that are off together for one pass of the camera."""
+    health = LandmarkHealth(MARKS)
+    for index in range(5):
+        health.contradicted(1, 0.1 * index, (5.10, 0.15), 0.10)
+    assert health.witnessed(2) == []
+    assert health.contradicted(1, 4.0, (5.10, 0.15), 0.10) is None
+    assert health.moved == {}
+
+
 def test_places_that_disagree_are_no_new_place() -> None:
     health = LandmarkHealth(MARKS)
     for index in range(12):

@@ -33,7 +33,7 @@ def test_an_improbable_map_is_suspected_until_it_is_probable_again() -> None:
     suspicion = Suspicion(0.2)
     reasons = [
         suspicion.judge(10.0, 6, {}, MapMisfit(8.0 + 4.0 * sigmas, 8.0, 1)).reason
-        for sigmas in (0.0, 2.9, 3.1, 2.0, 0.9, 2.0)
+        for sigmas in (0.0, 3.9, 4.1, 3.1, 2.9, 3.9)
     ]
     assert [bool(reason) for reason in reasons] == [False, False, True, True, False, False]
     assert "landmark 1: check the map" in reasons[2]

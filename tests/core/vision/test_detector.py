@@ -177,6 +177,20 @@ def test_tape_a_little_wider_than_the_pole_is_not_taken_for_paint(lighter: int) 
         assert ALL.detect(taped) == [], segment
 
 
+def test_a_cover_matters_where_it_makes_one_landmark_of_another() -> None:
+    """A dark board crosses 12 where 13 has a bright bit and 14 another one."""
+    image = picture([pole(12, 3.0, 0.0)], 2)
+    one = only(image)
+    unit = (one.bottom - one.top) / 13
+    rows = slice(round(one.top + 3 * unit), round(one.top + 4 * unit))
+    middle, black = round(one.column), image[rows.start + 2, round(one.column)].astype(int)
+    for side in (slice(0, middle - round(0.7 * unit)), slice(middle + round(0.7 * unit), 400)):
+        image[rows, side] = black + 3
+    for others, seen in (((13,), []), ((15,), []), ((14,), [12]), ((3, 10), [12])):
+        some = LandmarkDetector(CAMERA, dict.fromkeys((12, *others), LandmarkKind()))
+        assert [found.id for found in some.detect(image)] == seen, others
+
+
 def cut(image: Image, first: int, end: int, lower: float = 0.0) -> list[Detection]:
     """What is seen in these rows of a picture, all that a camera shows; ``lower``: by how many rows
     its axis is thought to be lower."""

@@ -56,10 +56,11 @@ static double median_dark(double levels[][EYE_LIGHTS], const char *code, int seg
     return (values[(n - 1) / 2] + values[n / 2]) / 2;
 }
 
-/* Whether a bit that reads dark may be something else in front of it. */
-int eye_covered(const eye_picture *p, const eye_upright *u, const eye_scale *scale,
-                const eye_side *side, const char *code, double levels[][EYE_LIGHTS], int segments,
-                double noise)
+/* Whether a bit that reads dark may be something else in front of it, which makes one landmark of
+ * another. */
+int eye_covered(const eye_picture *p, const eye_task *task, const eye_upright *u,
+                const eye_scale *scale, const eye_side *side, const char *code,
+                double levels[][EYE_LIGHTS], int segments, double noise)
 {
     double contrast = 0, black[3];
     int clear[2][EYE_MOST_SEGMENTS], same[2][EYE_MOST_SEGMENTS];
@@ -99,7 +100,7 @@ int eye_covered(const eye_picture *p, const eye_upright *u, const eye_scale *sca
         }
     }
     for (int i = 3; i < segments - 3; i += 2) {
-        if (code[i] == '1')
+        if (code[i] == '1' || !eye_mistakable(task, code, segments, i))
             continue;
         int covered = same[0][i] && same[1][i];
         for (int way = 0; way < 2; way++) {

@@ -204,7 +204,8 @@ static int examine(const eye_picture *picture, const eye_task *task,
                                   &doubt);
     if (reason != EYE_READ)
         return reason;
-    if (eye_covered(picture, &upright, &scale, &side, out->code, levels, segments, scale.noise / 2))
+    if (eye_covered(picture, task, &upright, &scale, &side, out->code, levels, segments,
+                    scale.noise / 2))
         return EYE_COVERED;
     if (eye_in_front(picture, task, &upright, &scale, &side, out->code, levels, segments))
         return EYE_COVERED;

@@ -312,7 +312,7 @@ static double step(const scene *s, const eye_upright *u, int from, int to)
     return room > 0 ? at_most(most / (STEP * room + STEP_SPREAD * s->usual)) : 0;
 }
 
-/* Whether something stands in front of a bit. */
+/* Whether something stands in front of a bit, which makes one landmark of another. */
 int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *u,
                  const eye_scale *scale, const eye_side *side, const char *code,
                  double levels[][EYE_LIGHTS], int segments)
@@ -340,6 +340,8 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
     if (s.contrast <= 0 || scale->unit < LEAST_UNIT)
         return 0;
     for (int i = 3; i < segments - 3; i += 2) {
+        if (!eye_mistakable(task, code, segments, i))
+            continue;
         if (!filled) {
             for (int way = 0; way < 2; way++)
                 fill_margin(p, u, side, &s, task->low, way ? 1 : -1, s.beside + way);

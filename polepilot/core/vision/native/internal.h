@@ -82,12 +82,11 @@ int eye_fit_side(const eye_picture *picture, const eye_upright *upright, double 
 int eye_look_at_ends(const eye_picture *picture, const eye_upright *upright,
                      const eye_scale *scale, const eye_side *side, const char *code,
                      double levels[][EYE_LIGHTS], int segments, double *doubt);
-int eye_covered(const eye_picture *picture, const eye_upright *upright, const eye_scale *scale,
-                const eye_side *side, const char *code, double levels[][EYE_LIGHTS], int segments,
-                double noise);
+int eye_covered(const eye_picture *picture, const eye_task *task, const eye_upright *upright,
+                const eye_scale *scale, const eye_side *side, const char *code,
+                double levels[][EYE_LIGHTS], int segments, double noise);
 double eye_apart(const eye_picture *picture, const eye_upright *upright, const eye_scale *scale,
                  const eye_side *side, const char *code, int segments);
-
 int eye_in_front(const eye_picture *picture, const eye_task *task, const eye_upright *upright,
                  const eye_scale *scale, const eye_side *side, const char *code,
                  double levels[][EYE_LIGHTS], int segments);
@@ -97,6 +96,7 @@ int eye_in_front(const eye_picture *picture, const eye_task *task, const eye_upr
 int eye_solve(double *matrix, double *right, int n, int rights);
 int eye_decode(const char *code, int segments);
 void eye_encode(int id, int bits, char *code);
+int eye_mistakable(const eye_task *task, const char *code, int segments, int at);
 
 static inline int eye_clamp(int value, int low, int high)
 {

@@ -79,11 +79,12 @@ class LandmarkHealth:
     """Landmarks found displaced, and by how much; they are not to be used."""
 
     def contradicted(
-        self, number: int, stamp: float, place: Point, sigma: float = 0.0
+        self, number: int, stamp: float, place: Point, sigma: float = 0.0, convict: bool = True
     ) -> Verdict | None:
         """``number`` appeared at ``place`` while other landmarks agreed with the pose.
 
-        ``sigma``: how well that place is known, metres.
+        ``sigma``: how well that place is known, metres. ``convict``: False while it is only to be
+        remembered, as the pose itself is not sure.
         """
         self._agreed.pop(number, None)
         if number in self.moved:
@@ -92,7 +93,7 @@ class LandmarkHealth:
         places.append((stamp, place, sigma))
         while stamp - places[0][0] > _MEMORY:
             places.popleft()
-        if len(places) < _SIGHTINGS or stamp - places[0][0] < _SPAN:
+        if not convict or len(places) < _SIGHTINGS or stamp - places[0][0] < _SPAN:
             return None
         return self._verdict(number)
 

@@ -403,7 +403,7 @@ class Localizer:
             self._last_agreed[number] = stamp
             health.agreed(number)
             self._trial.agrees(measurement)
-            if gap < 0.5 * settings.tolerance:
+            if gap < 0.5 * settings.tolerance and not self._trial.undecided:
                 for verdict in health.witnessed(number):
                     self._tell(verdict, stamp)
             self._seen(track, measurement)
@@ -426,7 +426,9 @@ class Localizer:
 
     def _contradicted(self, number: int, stamp: float, place: Point, sigma: float) -> None:
         """A landmark is not in its place though the pose is right: is it to be left out?"""
-        if (verdict := self._health.contradicted(number, stamp, place, sigma)) is not None:
+        convict = not self._trial.undecided
+        verdict = self._health.contradicted(number, stamp, place, sigma, convict)
+        if verdict is not None:
             self._tell(verdict, stamp)
 
     def _tell(self, verdict: Verdict, stamp: float) -> None:
@@ -487,10 +489,8 @@ class Localizer:
         judged = self._doubt.judge(track.stamp, self._last_agreed, standing)
         if judged is None:
             return
-        if judged.status == "lost":
-            self._belief.lose(track.stamp, judged.reason)
-        else:
-            self._belief.doubt(track.stamp, judged.reason)
+        react = self._belief.lose if judged.status == "lost" else self._belief.doubt
+        react(track.stamp, judged.reason)
 
     def _judge(self, track: Track) -> Suspected:
         misfit, moved = track.filter.map_misfit, self._health.moved

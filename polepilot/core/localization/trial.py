@@ -43,6 +43,11 @@ class Trial:
     def over(self) -> bool:
         return len(self.fixed_by) != 2
 
+    @property
+    def undecided(self) -> bool:
+        """A third landmark is still to say whether the two are right."""
+        return not self.over and len(self.landmarks) >= 3
+
     def begin(self, fixed_by: Collection[int], used: Sequence[RangeBearing] = ()) -> None:
         """``used``: the sightings that led to the pose."""
         self.fixed_by = frozenset(fixed_by)
@@ -92,7 +97,7 @@ class Trial:
         Where the map has no third landmark nothing better will come: the two are believed.
         """
         spread = np.zeros((3, 3))
-        if self.over or len(self.landmarks) < 3:
+        if not self.undecided:
             return spread
         one, other = (self.landmarks[number] for number in self.fixed_by)
         turn = self.shift / math.dist(one.position, other.position)

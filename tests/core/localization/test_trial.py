@@ -128,6 +128,24 @@ def test_a_wrong_pose_never_has_a_small_sigma(by: float) -> None:
     assert localizer.moved_landmarks.keys() <= {2}
 
 
+def test_a_pose_on_trial_convicts_nobody() -> None:
+    """Landmark 2 was moved, and 3 is in its place: it is not 3 that has been moved."""
+    turn = 2.0 * math.asin(0.5 * 0.4 / 4.0)
+    moved = (4.0 * math.cos(turn), 4.0 * math.sin(turn))
+    localizer = Localizer(MARKS, Vehicle(), FORWARD)
+    localizer.add_odometry(Odometry(0.0, 0.0, 0.0))
+    for index in range(30):
+        number = 3 if index >= 6 else 1 + index % 2
+        at = moved if number == 2 else None
+        localizer.add_measurements([sight(number, 0.1 * index, at)])
+        if index % 7 == 6:
+            localizer.add_measurements([sight(1, 0.1 * index + 0.05)])
+    codes = [event.code for event in localizer.events()]
+    assert "rejected" in codes
+    assert "landmark_moved" not in codes
+    assert localizer.moved_landmarks == {}
+
+
 def test_two_poses_of_as_many_landmarks_are_no_pose() -> None:
     """Landmark 2 was moved round 1; so 1 and 2 agree, and 1 and 3 do."""
     turn = 2.0 * math.asin(0.5 * 0.5 / 4.0)

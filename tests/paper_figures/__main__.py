@@ -143,6 +143,34 @@ def _accuracy(results: Path) -> str:
     return _rows(head, rows)
 
 
+def _noticed(results: Path) -> str:
+    """What the final judgement says besides errors; "" without it."""
+    measured = _load(results, "localization")
+    if measured is None:
+        return ""
+    kinds = [kind for kind in _SCENARIOS if kind in measured]
+    count = sum(measured[kind]["recordings"] for kind in kinds)
+    costs = [measured[kind]["microseconds_per_measurement"] for kind in kinds]
+    false = sum(len(measured[kind]["false_reports"]) for kind in kinds)
+    rows = []
+    for kind, name, words, digits in (
+        ("lifted", "recovery_s", "a pose again after the second whole pole, s, at worst", 2),
+        ("moved", "moved_after_sweeps", "a moved pole is reported after, sweeps, at worst", 2),
+        ("moved", "moved_error_cm", "its displacement is off by, cm, at worst", 1),
+    ):
+        if kind not in measured:
+            continue
+        floor, target, _ = OTHERS[name]
+        value = measured[kind][name]
+        limits = f"{floor:g}" if floor == target else f"{floor:g} → {target:g}"
+        missed = "" if value <= floor else " (missed)"
+        rows.append([words, limits, f"**{value:.{digits}f}**{missed}"])
+    rows.append([f"false reports in all {count} recordings", "0", f"**{false}**"])
+    shown = f"**{min(costs):.0f} to {max(costs):.0f}**"
+    rows.append(["CPU time per measurement, with fixes and books, microseconds", "100", shown])
+    return _rows(["", "floor → target", "ours"], rows)
+
+
 def _limited(value: float, limits: tuple[float, float, bool]) -> str:
     missed = value < limits[0] if limits[2] else value > limits[0]
     return f"{value:.1f} %" + (" (missed)" if missed else "")
@@ -152,6 +180,7 @@ TABLES: Mapping[str, Callable[[Path], str]] = {
     "table1": _table1,
     "claims": _claims,
     "accuracy": _accuracy,
+    "noticed": _noticed,
 }
 """What may stand between marks, by name."""
 

@@ -1,7 +1,7 @@
 """Long campaigns, by ``./run soak``: the localizer's final judgement, figures printed.
 
 With ``POLEPILOT_RESULTS=docs/results`` the figures are kept for docs/localization.md; with
-``POLEPILOT_RECORDINGS`` a folder keeps the recordings. Half an hour on two cores, 6 GB of disk.
+``POLEPILOT_RECORDINGS`` a folder keeps the recordings. An hour on two cores, 20 GB of disk.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import os
 from pathlib import Path
 
 import pytest
-from recordings.final import FINAL, campaign, missed, table
+from recordings.final import FINAL, LIMITS, campaign, missed, table
 from recordings.scenario import KINDS
 
 pytestmark = pytest.mark.soak
@@ -20,10 +20,10 @@ pytestmark = pytest.mark.soak
 @pytest.mark.timeout(3 * 3600)
 def test_final_recordings(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     keep = Path(os.environ.get("POLEPILOT_RECORDINGS", tmp_path))
-    result = campaign(KINDS, FINAL, keep)
+    result = campaign(tuple(LIMITS), FINAL, keep)
     folder = os.environ.get("POLEPILOT_RESULTS")
     if folder:
-        path = Path(folder) / "localization-recordings.json"
+        path = Path(folder) / "localization.json"
         path.write_text(json.dumps(result, indent=1) + "\n")
     with capfd.disabled():
         print(f"\n{table(result)}")

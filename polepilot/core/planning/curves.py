@@ -77,35 +77,29 @@ def sample(
     pose: Pose2D, curve: Curve, radius: float
 ) -> tuple[NDArray[np.float64], NDArray[np.int8], Pose2D]:
     """N x 2 points with the start, N-1 gears, and the pose at the end."""
-    points: list[NDArray[np.float64]] = [np.array([[pose.x, pose.y]])]
-    gears: list[NDArray[np.int8]] = []
+    rows: list[tuple[float, float, float, float, float]] = []
+    counts: list[int] = []
+    start = (pose.x, pose.y)
     for piece in curve:
         kind, length = piece
-        if abs(length) < 1e-6:  # no point of its own, but what it turns tells a metre on
-            pose = drive(pose, piece, radius)
-            continue
-        if kind == "S":
-            count = 1
-            new = np.array([pose.ahead(length)])
-        else:
-            side = 1.0 if kind == "L" else -1.0
-            count = max(1, math.ceil(abs(length) / radius / STEP - 1e-6))
-            angle = pose.heading + side * np.arange(1, count + 1) / count * length / radius
-            new = np.stack(
-                [
-                    pose.x + side * radius * (np.sin(angle) - math.sin(pose.heading)),
-                    pose.y - side * radius * (np.cos(angle) - math.cos(pose.heading)),
-                ],
-                axis=1,
-            )
-        points.append(new)
-        gears.append(np.full(count, 1 if length > 0 else -1, np.int8))
+        if abs(length) >= 1e-6:  # else no point of its own, but what it turns tells a metre on
+            bend = _SIDES[kind] * length / radius
+            rows.append((pose.x, pose.y, pose.heading, bend, length))
+            counts.append(max(1, math.ceil(abs(bend) / STEP - 1e-6)))
         pose = drive(pose, piece, radius)
-    return (
-        np.vstack(points),
-        np.concatenate(gears) if gears else np.zeros(0, np.int8),
-        pose,
-    )
+    if not rows:
+        return np.array([start]), np.zeros(0, np.int8), pose
+    of = np.repeat(np.arange(len(rows)), counts)
+    x, y, heading, bend, length = np.array(rows)[of].T
+    ends = np.cumsum(counts)
+    share = (np.arange(1, len(of) + 1) - (ends - counts)[of]) / np.array(counts)[of]
+    turned = share * bend / 2
+    chord = share * length * np.sinc(turned / math.pi)
+    points = np.empty((len(of) + 1, 2))
+    points[0] = start
+    points[1:, 0] = x + chord * np.cos(heading + turned)
+    points[1:, 1] = y + chord * np.sin(heading + turned)
+    return points, np.where(length > 0, 1, -1).astype(np.int8), pose
 
 
 def shortest_curves(start: Pose2D, goal: Pose2D, radius: float, change: float) -> list[Curve]:
@@ -114,9 +108,9 @@ def shortest_curves(start: Pose2D, goal: Pose2D, radius: float, change: float) -
 
 
 def shortest_curves_each(
-    ways: Sequence[tuple[Pose2D, Pose2D]], radius: float, change: float
+    ways: Sequence[tuple[Pose2D, Pose2D]], radius: float, change: float, most: int = _MOST
 ) -> list[list[Curve]]:
-    """The same for many starts and goals at once."""
+    """The same for many starts and goals at once, ``most`` for each."""
     goals = np.array(
         [
             (*start.to_local(goal.position), wrap_angle(goal.heading - start.heading) * radius)
@@ -125,12 +119,12 @@ def shortest_curves_each(
     )
     return [
         [tuple((kind, length * radius) for kind, length in curve) for curve in curves]
-        for curves in _curves(np.round(goals / radius, 9), round(change / radius, 6))
+        for curves in _curves(np.round(goals / radius, 9), round(change / radius, 6), most)
     ]
 
 
-def _curves(goals: Array, change: float) -> list[list[Curve]]:
-    """The ``_MOST`` best for radius 1 to each of N goals x, y, heading."""
+def _curves(goals: Array, change: float, most: int) -> list[list[Curve]]:
+    """The ``most`` best for radius 1 to each of N goals x, y, heading."""
     with np.errstate(invalid="ignore"):  # what is no number is no curve
         kinds, lengths = _words(*goals.T)
         cost = np.abs(lengths).sum(axis=2)
@@ -143,14 +137,17 @@ def _curves(goals: Array, change: float) -> list[list[Curve]]:
         good = _arrive(kinds, lengths, goals) & (cost > 1e-7)
     cost = np.where(good, np.round(cost, 9), np.inf)
     found: list[list[Curve]] = []
-    for goal in range(len(goals)):
+    orders = np.argsort(cost, axis=0, kind="stable")
+    counts = good.sum(axis=0).tolist()
+    for goal, count in enumerate(counts):
         best: dict[tuple[Piece, ...], Curve] = {}
-        for word in np.argsort(cost[:, goal], kind="stable").tolist():
-            if not good[word, goal] or len(best) == _MOST:
+        words = orders[:count, goal]
+        for word, row in zip(words.tolist(), lengths[words, goal].tolist(), strict=True):
+            pieces = zip(_WORDS[word], row, strict=False)
+            curve = tuple([piece for piece in pieces if not -1e-7 <= piece[1] <= 1e-7])
+            best.setdefault(tuple([(kind, round(length, 6)) for kind, length in curve]), curve)
+            if len(best) == most:
                 break
-            pieces = zip(_WORDS[word], lengths[word, goal].tolist(), strict=False)
-            curve = tuple((kind, length) for kind, length in pieces if abs(length) > 1e-7)
-            best.setdefault(tuple((kind, round(length, 6)) for kind, length in curve), curve)
         found.append(list(best.values()))
     return found
 
@@ -176,11 +173,16 @@ _SIDES = {"L": 1.0, "R": -1.0, "S": 0.0}
 _MIRRORED = str.maketrans("LR", "RL")
 _FORMS = tuple(itertools.product((False, True), (1.0, -1.0), (1.0, -1.0)))
 """Each family is driven as it is or from its end, forward or backward, and mirrored."""
-_WORDS = tuple(
+_ALL_WORDS = tuple(
     (family[::-1] if reverse else family).translate(_MIRRORED if mirror < 0 else {})
     for family in _FAMILIES
     for reverse, _, mirror in _FORMS
 )
+_NEW = np.array(
+    [family in ("LRSL", "LRSR") or not form[0] for family in _FAMILIES for form in _FORMS]
+)
+"""The others are the same from their end as they are mirrored, or as they are."""
+_WORDS = tuple(word for word, new in zip(_ALL_WORDS, _NEW, strict=True) if new)
 _KINDS = np.array([[_SIDES[kind] for kind in word.ljust(_LONGEST, "S")] for word in _WORDS])
 
 
@@ -201,7 +203,7 @@ def _words(x: Array, y: Array, turn: Array) -> tuple[Array, Array]:
         for place, length in enumerate(family):
             lengths[index, :half, :, place] = (backs * length)[:half]
             lengths[index, half:, :, len(family) - 1 - place] = (backs * length)[half:]
-    return _KINDS, lengths.reshape(len(_WORDS), len(x), _LONGEST)
+    return _KINDS, lengths.reshape(len(_NEW), len(x), _LONGEST)[_NEW]
 
 
 def _families(x: Array, y: Array, turn: Array) -> Iterator[tuple[Array, ...]]:

@@ -43,6 +43,8 @@ _MOST_TURNS = 80
 _SHORT = 0.15
 """A leg shorter than this is not worth a manoeuvre of its own, metres."""
 _MOST_TRIES = 20
+_CURVES = 6
+"""So many curves to a pose are looked at."""
 _AHEAD = (0.0, -0.6, 1.0, 1.6, 2.4)
 """How far beyond a place its line may be joined, to drive back to it, in turning radii."""
 _BACK_OUT = (0.25, 0.5, 0.8, 1.2, 1.8, 2.6, 3.8, 5.5, 8.0, 12.0, 20.0, 40.0)
@@ -200,9 +202,9 @@ class Driver:
             for ahead in (share * self._radius for share in _AHEAD):
                 between.append((here, Pose2D(*goal.ahead(ahead), heading)))
                 beyond.append((back, ahead))
-        every = shortest_curves_each(between, self._radius, CHANGE)
+        every = shortest_curves_each(between, self._radius, CHANGE, _CURVES)
         for (back, ahead), curves in zip(beyond, every, strict=True):
-            for curve in curves[:6]:
+            for curve in curves:
                 whole = joined((("S", -back), *curve, ("S", -ahead)))
                 found.append((curve_cost(whole), whole))
         found.sort(key=lambda entry: entry[0])

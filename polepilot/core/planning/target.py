@@ -14,6 +14,7 @@ from shapely import MultiPolygon
 
 from polepilot.core.planning.bands import Bands, bands_of
 from polepilot.core.planning.footprint import Footprint
+from polepilot.core.planning.space import polygons
 
 Points = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -50,11 +51,15 @@ class Target:
         self._round = Footprint(tool / 2, error).quadrant
         self._known: dict[tuple[int, bytes], shapely.Geometry] = {}
 
-    def missed(self, *lines: Points) -> shapely.Geometry:
+    def missed(self, *lines: Points) -> MultiPolygon:
         """What no disc along one of the lines, each N x 2 points, sweeps."""
-        left = self._left(lines)
-        parts = shapely.get_parts(left)
-        return shapely.disjoint_subset_union_all(parts[shapely.get_type_id(parts) == _POLYGON])
+        parts, tiles = shapely.get_parts(self._left(lines), return_index=True)
+        low, high = np.hsplit(shapely.bounds(parts).reshape(-1, 4), 2)
+        inside = ((low > self._low[tiles] + _GRID) & (high < self._high[tiles] - _GRID)).all(axis=1)
+        areal = shapely.get_type_id(parts) == _POLYGON
+        # What lies at the edge of a tile may go on in the next one.
+        joined = shapely.disjoint_subset_union_all(parts[areal & ~inside])
+        return MultiPolygon([*parts[areal & inside].tolist(), *polygons(joined)])
 
     def missed_area(self, *lines: Points) -> float:
         """Its area, m²."""

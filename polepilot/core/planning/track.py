@@ -140,7 +140,7 @@ class Track:
 
 
 def without_jerks(
-    path: Points, gears: NDArray[np.int8], shortest: float = 0.0005
+    path: Points, gears: NDArray[np.int8], shortest: float = 0.002
 ) -> tuple[Points, NDArray[np.int8], NDArray[np.intp]]:
     """A path without stretches in one gear below ``shortest`` metres, on which no wheel turns.
 

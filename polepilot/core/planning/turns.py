@@ -10,15 +10,12 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
-from shapely import LineString
 
 from polepilot.core.geometry import Pose2D, wrap_angle
 from polepilot.core.planning.curves import (
     CHANGE,
     Curve,
-    curve_cost,
     joined,
     sample,
     shortest_curves_each,
@@ -28,6 +25,8 @@ Points = NDArray[np.float64]
 
 _SHORTEST = 0.004
 """Pieces shorter than this are not driven, metres."""
+_CURVES = 4
+"""So many curves between two places are looked at."""
 
 
 _PLACES: tuple[tuple[float, float, bool, bool], ...] = (
@@ -118,29 +117,98 @@ def _left_turns(turn: float, radius: float) -> tuple[Turn, ...]:
         )
         for first, last, _, _ in _PLACES
     ]
+    every = shortest_curves_each(ends, radius, CHANGE, _CURVES)
+    found = [
+        (place, curve)
+        for place, curves in enumerate(every)
+        for curve in curves
+        if all(abs(length) >= least for _, length in curve)
+    ]
+    first, last = legs * np.array([_PLACES[place][:2] for place, _ in found]).reshape(-1, 2).T
+    visit, finish = np.array([_PLACES[place][2:] for place, _ in found], bool).reshape(-1, 2).T
+    finish = finish | (last < 0)  # what lies before the corner must be free as well
+    sides, lengths = _columns([curve for _, curve in found])
+    # What a curve leaves out of the legs: the way in up to the corner, the way out from there on.
+    shares = np.array([0.0, 0.25, 0.5, 0.75])[:, None]
+    beyond = np.maximum(shares, shares[1])
+    spots = [first[:, None, None] * shares * [1.0, 0.0], last[:, None, None] * beyond * out]
+    off = _distances(first, sides, lengths, radius, np.concatenate(spots, axis=1))
+    off_in, off_out = off.reshape(-1, 2, len(shares)).max(axis=2).T
+    cut = np.where(~visit & (first < 0), off_in, 0.0)
+    cut = np.maximum(cut, np.where(~finish & (last > 0), off_out, 0.0))
+    stop = np.where(finish, 0.0, last)
+    end = np.where(finish, -last, 0.0)
+    # Ten metres before the corner, where it is driven to first, or as far as the turn begins.
+    begin = np.where(visit, 10.0, 10.0 + first)
+    pieces = np.column_stack([begin, np.where(visit, first, 0.0), lengths, end])
+    cost = np.abs(pieces).sum(axis=1) + CHANGE * _changes(pieces)
+    cost = np.round(cost + 20 * np.minimum(cut, 0.5) ** 2 - 10.0 - stop, 9)
     ways: list[Turn] = []
-    every = shortest_curves_each(ends, radius, CHANGE)
-    for (share, end, visit, finish), (start, _), curves in zip(_PLACES, ends, every, strict=True):
-        first, last = share * legs, end * legs
-        finish = finish or last < 0  # what lies before the corner must be free as well
-        checks: list[Points] = []
-        if not visit and first < 0:
-            checks += [np.array([first * part, 0.0]) for part in (0.0, 0.25, 0.5, 0.75)]
-        if not finish and last > 0:
-            checks += [last * part * out for part in (0.25, 0.5, 0.75)]
-        for curve in curves[:4]:
-            if any(abs(length) < least for _, length in curve):
-                continue
-            cut = 0.0
-            if checks:
-                driven = sample(start, curve, radius)[0]
-                if len(driven) < 2:
-                    continue  # shorter than anything that is driven
-                line = LineString(driven)
-                cut = float(np.max(shapely.distance(line, shapely.points(np.array(checks)))))
-            whole: Curve = (*curve, ("S", -last)) if finish else curve
-            stop = 0.0 if finish else last
-            way = Turn(0.0, cut, first, visit, stop, joined(whole), radius)
-            cost = curve_cost(way.after(10.0)) - 10.0 - stop + 20 * min(cut, 0.5) ** 2
-            ways.append(replace(way, cost=cost))
-    return tuple(sorted(ways, key=lambda way: way.cost))
+    for row in np.argsort(cost, kind="stable").tolist():
+        curve = joined((*found[row][1], ("S", float(end[row]))))
+        ways.append(
+            Turn(
+                float(cost[row]),
+                float(cut[row]),
+                float(first[row]),
+                bool(visit[row]),
+                float(stop[row]),
+                curve,
+                radius,
+            )
+        )
+    return tuple(ways)
+
+
+def _columns(curves: list[Curve]) -> tuple[Points, Points]:
+    """Sides of the pieces of curves (1: left, -1: right), and their lengths; N x 5 each."""
+    sides = {"L": 1.0, "R": -1.0, "S": 0.0}
+    filled = [(*curve, *[("S", 0.0)] * (5 - len(curve))) for curve in curves]
+    return (
+        np.array([[sides[kind] for kind, _ in curve] for curve in filled]).reshape(-1, 5),
+        np.array([[length for _, length in curve] for curve in filled]).reshape(-1, 5),
+    )
+
+
+def _changes(pieces: Points) -> Points:
+    """How often each row of signed lengths changes its gear, entered and left forward."""
+    count, gear = np.zeros(len(pieces)), np.ones(len(pieces))
+    for column in (*pieces.T, np.ones(len(pieces))):
+        new = np.where(np.abs(column) > 1e-6, np.sign(column), gear)
+        count += new != gear
+        gear = new
+    return count
+
+
+def _distances(
+    first: Points, sides: Points, lengths: Points, radius: float, spots: Points
+) -> Points:
+    """How far each curve, from ``first`` on the x axis on, stays away from its spots, N x K x 2."""
+    x, y, heading = first.copy(), np.zeros(len(first)), np.zeros(len(first))
+    near = np.hypot(spots[..., 0] - x[:, None], spots[..., 1] - y[:, None])
+    for side, length in zip(sides.T, lengths.T, strict=True):
+        ahead = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+        left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+        off = spots - np.stack([x, y], axis=1)[:, None]
+        along = (off * ahead[:, None]).sum(axis=2)
+        across = (off * left[:, None]).sum(axis=2)
+        # Beside a straight piece, or between the two ends of an arc as seen from its middle.
+        gear = np.sign(length)[:, None]
+        inside = (gear * along > 0) & (gear * along < np.abs(length)[:, None])
+        beside = np.where(inside, np.abs(across), np.inf)
+        bow = side[:, None]
+        angle = np.arctan2(gear * along, radius - bow * across) % math.tau
+        swung = angle <= np.abs(length)[:, None] / radius
+        rim = np.abs(np.hypot(along, radius - bow * across) - radius)
+        near = np.minimum(near, np.where(bow == 0, beside, np.where(swung, rim, np.inf)))
+        turned = heading + side * length / radius
+        straight = side == 0
+        x = x + np.where(
+            straight, length * np.cos(heading), side * radius * (np.sin(turned) - np.sin(heading))
+        )
+        y = y + np.where(
+            straight, length * np.sin(heading), side * radius * (np.cos(heading) - np.cos(turned))
+        )
+        heading = turned
+        near = np.minimum(near, np.hypot(spots[..., 0] - x[:, None], spots[..., 1] - y[:, None]))
+    return near

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from polepilot.commands.files import write_whole
+from polepilot.commands.drawings import encoded, place_for_each
+from polepilot.commands.files import whole_files
 from polepilot.commands.ids import parse_ids
-from polepilot.core.errors import ImageError, InputError
+from polepilot.core.errors import InputError
 
 if TYPE_CHECKING:
     from polepilot.core.landmark import LandmarkKind
@@ -20,6 +22,22 @@ if TYPE_CHECKING:
     from polepilot.core.vision.detector import LandmarkDetector, Look
     from polepilot.core.vision.paint import Paint
     from polepilot.core.vision.paper import PaperDetector
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """What is kept of a picture after it was looked at."""
+
+    file: str
+    found: tuple[Detection, ...]
+    summary: str
+    """In words: what was found and rejected."""
+
+    @classmethod
+    def of(cls, file: str, look: Look) -> _Seen:
+        from polepilot.core.vision.annotate import summary
+
+        return cls(file, tuple(one.detection for one in look.found), summary(look))
 
 
 def detect(
@@ -61,40 +79,42 @@ def detect(
         raise InputError(f"--camera-constant is {camera_constant}: expected pixels, above 0.")
     if detector not in ("default", "paper"):
         raise InputError(f"--detector is {detector!r}: expected 'default' or 'paper'.")
-    drawings = [] if annotate is None else _drawings(annotate, files)
+    drawings = [] if annotate is None else place_for_each(annotate, files)
     paint = paint_of(bright)
     if detector == "paper" and str(paint) != "orange":
         raise InputError(f"--bright is {bright!r}: expected 'orange' with --detector paper.")
     axis = None if center is None else parse_center(center)
     kinds = kinds_of(ids, bits, segment, diameter, shape)
-    images: list[Image] = []
-    problems = []
-    for file in files:
-        try:
-            images.append(read_image(file))
-        except ImageError as error:
-            problems.append(error.message.rstrip("."))
-    if problems:
-        raise ImageError("; ".join(problems) + ".")
-    frames: list[tuple[str, Look]] = []
-    for file, image in zip(files, images, strict=True):
-        camera = _camera(image, camera_constant, axis)
-        frames.append((file, _detector(detector, camera, kinds, paint).examine(image)))
-    pages = {
-        out: _encoded(draw(image, look, Path(file).name), out)
-        for out, image, (file, look) in zip(drawings, images, frames, strict=False)
-    }
-    write_whole(pages, "--annotate")
+    seen: list[_Seen] = []
+    problems: list[str] = []
+    with whole_files("--annotate") as write:
+        # One picture at a time, so that thousands need no more memory than one.
+        for index, file in enumerate(files):
+            try:
+                image = read_image(file)
+                if problems:
+                    continue  # all that is wrong is said, nothing else is done any more
+                camera = _camera(image, camera_constant, axis)
+                look = _detector(detector, camera, kinds, paint).examine(image)
+                if drawings:
+                    out = drawings[index]
+                    write(out, encoded(draw(image, look, Path(file).name), out))
+            except InputError as error:
+                problems.append(error.message.rstrip("."))
+            else:
+                seen.append(_Seen.of(file, look))
+        if problems:
+            raise InputError("; ".join(problems) + ".")
     if as_json:
         document = {
             "frames": [
-                {"file": file, "detections": [_entry(one.detection) for one in look.found]}
-                for file, look in frames
+                {"file": one.file, "detections": [_entry(found) for found in one.found]}
+                for one in seen
             ]
         }
         typer.echo(json.dumps(document))
     else:
-        _table(frames)
+        _table(seen)
 
 
 def parse_center(text: str) -> tuple[float, float]:
@@ -183,20 +203,22 @@ def _entry(detection: Detection) -> dict[str, Any]:
     }
 
 
-def _table(frames: list[tuple[str, Look]]) -> None:
+def _table(seen: list[_Seen]) -> None:
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
-    from polepilot.core.vision.annotate import summary
+    from polepilot.core.vision.images import shown
 
     table = Table("picture", "id", "range cm", "± cm", "bearing °", "± °", "column")
-    for file, look in frames:
-        if not look.found:
-            table.add_row(file, "-", "", "", "", "", "")
-        for one in look.found:
-            d = one.detection
+    for one in seen:
+        # As Text: brackets and colons in a name are no markup.
+        name = Text(shown(one.file))
+        if not one.found:
+            table.add_row(name, "-", "", "", "", "", "")
+        for d in one.found:
             table.add_row(
-                file,
+                name,
                 str(d.id),
                 f"{d.range * 100:.1f}",
                 f"{d.range_sigma * 100:.1f}",
@@ -206,42 +228,6 @@ def _table(frames: list[tuple[str, Look]]) -> None:
             )
     console = Console()
     console.print(table)
-    for file, look in frames:
-        if not look.found:
-            console.print(
-                f"{file}: {summary(look)}.", markup=False, highlight=False, soft_wrap=True
-            )
-
-
-def _drawings(out: Path, files: list[str]) -> list[Path]:
-    """Where what was found in each file is drawn.
-
-    Raises:
-        InputError: no name of a picture, or that of one of ``files``.
-    """
-    if out.suffix.lower() not in (".png", ".jpg", ".jpeg"):
-        raise InputError(f"--annotate {out}: expected a file whose name ends with .png or .jpg.")
-    numbers = range(1, len(files) + 1)
-    if len(files) > 1:
-        drawings = [out.with_stem(f"{out.stem}-{number}") for number in numbers]
-    else:
-        drawings = [out]
-    taken = {Path(file).resolve() for file in files}
-    for drawing in drawings:
-        if drawing.resolve() in taken:
-            raise InputError(f"--annotate {drawing}: is a picture to look at; expected a new file.")
-    return drawings
-
-
-def _encoded(picture: Image, out: Path) -> bytes:
-    import cv2
-
-    try:
-        done, data = cv2.imencode(out.suffix.lower(), picture)
-    except cv2.error:
-        done = False
-    if not done:
-        raise InputError(
-            f"--annotate {out}: the picture is too large to be written as such a file."
-        )
-    return data.tobytes()
+    for one in seen:
+        if not one.found:
+            console.print(Text(f"{shown(one.file)}: {one.summary}."), soft_wrap=True)

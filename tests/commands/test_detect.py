@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import math
 import re
+import weakref
 from pathlib import Path
 
 import cv2
+import numpy as np
 import pytest
 from vision_scenes import picture, pole
 
@@ -16,7 +18,10 @@ from polepilot.commands.ids import parse_ids
 from polepilot.commands.main import run
 from polepilot.core.errors import InputError
 from polepilot.core.landmark import LandmarkKind
+from polepilot.core.observation import Image
 from polepilot.core.sim.render import Look
+from polepilot.core.vision import images
+from polepilot.core.vision.images import read_image
 from polepilot.core.vision.paint import Paint
 
 KEYS = {"id", "range", "bearing", "column", "top", "bottom", "range_sigma", "bearing_sigma"}
@@ -194,6 +199,94 @@ def test_annotate_spares_what_it_looks_at(
     assert run(["detect", *files, "--annotate", str(tmp_path / "a.png")]) == 2
     assert Path(near).read_bytes() == (tmp_path / "a-2.png").read_bytes() == before
     assert not (tmp_path / "a-1.png").exists()
+
+
+def test_a_drawing_too_large_for_its_file_is_told_in_one_line(
+    near: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    tall = tmp_path / "tall.png"
+    cv2.imwrite(str(tall), np.zeros((70_000, 3, 3), np.uint8))
+    out = tmp_path / "out"
+    out.mkdir()
+    assert run(["detect", near, str(tall), "--annotate", str(out / "t.jpg")]) == 2
+    said = capfd.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+    assert f"--annotate {out / 't-2.jpg'}: the drawing has 640 x 70" in said.err
+    assert list(out.iterdir()) == []
+    assert run(["detect", str(tall), "--annotate", str(out / "t.png")]) == 0
+
+
+def test_pictures_are_held_one_at_a_time(
+    near: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    alive: list[weakref.ref[Image]] = []
+    most = 0
+
+    def watched(path: str) -> Image:
+        nonlocal most
+        image = read_image(path)
+        alive.append(weakref.ref(image))
+        most = max(most, sum(one() is not None for one in alive))
+        return image
+
+    monkeypatch.setattr(images, "read_image", watched)
+    out = tmp_path / "seen.png"
+    assert run(["detect", *[near] * 12, "--annotate", str(out), "--json"]) == 0
+    assert len(alive) == 12
+    assert most <= 2
+    assert len(list(tmp_path.glob("seen-*.png"))) == 12
+
+
+def test_one_unreadable_picture_leaves_no_drawing(
+    near: str, empty: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "seen-1.png").write_bytes(b"old")
+    bad = [str(tmp_path / "gone.png"), str(tmp_path / "lost.png")]
+    files = [near, bad[0], empty, bad[1]]
+    assert run(["detect", *files, "--annotate", str(out / "seen.png")]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+    assert all(name in said.err for name in bad)
+    assert [path.name for path in out.iterdir()] == ["seen-1.png"]
+    assert (out / "seen-1.png").read_bytes() == b"old"
+
+
+def test_links_in_a_circle_are_one_line(
+    near: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    circle = tmp_path / "circle.png"
+    circle.symlink_to(circle)
+    assert run(["detect", near, "--annotate", str(circle)]) == 2
+    assert run(["detect", str(circle), "--annotate", str(tmp_path / "seen.png")]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2
+    assert all("circle.png" in line for line in lines)
+    assert circle.is_symlink()
+
+
+def test_names_are_no_markup(
+    near: str,
+    empty: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    here = Path(near).parent
+    monkeypatch.chdir(here)
+    monkeypatch.setenv("COLUMNS", "200")
+    names = ["a[/b]/r0.png", "[red]y.png", ":smile:.png", "end\\.png"]
+    for name in names:
+        (here / name).parent.mkdir(parents=True, exist_ok=True)
+        (here / name).write_bytes(Path(near).read_bytes())
+    (here / "[bold]:smile:none.jpg").write_bytes(Path(empty).read_bytes())
+    assert run(["detect", *names, "[bold]:smile:none.jpg"]) == 0
+    out = capsys.readouterr().out
+    for name in names:
+        assert f" {name} " in out
+    assert out.count("[bold]:smile:none.jpg") == 2
 
 
 def test_where_nothing_is_found_the_table_says_what_was_rejected(

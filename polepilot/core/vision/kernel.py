@@ -177,7 +177,7 @@ class Kernel:
 
     def look(self, image: Image) -> list[Strip]:
         """All strips of a picture (rows x columns x 3 BGR, or grey) that were worth a closer look,
-        read and rejected ones, the widest first.
+        read and rejected ones, the widest first. A picture of three equal channels is a grey one.
 
         Raises:
             InternalError: not such a picture.
@@ -189,7 +189,9 @@ class Kernel:
                 f"a picture of {image.dtype}, {shape}: expected uint8, rows x columns x 3, "
                 "or rows x columns."
             )
-        channels = shape[2] if len(shape) == 3 else 1
+        if _is_grey(image):
+            image = image[:, :, 0]
+        channels = image.shape[2] if image.ndim == 3 else 1
         strides = image.strides
         if strides[-1] != 1 or strides[1] != channels:
             image = np.ascontiguousarray(image)
@@ -200,6 +202,17 @@ class Kernel:
         if count < 0:
             raise MemoryError("no memory to look at a picture")
         return strips[:count]
+
+
+def _is_grey(image: Image) -> bool:
+    """Whether three channels say the same everywhere, as a monochrome camera's often do."""
+    if image.ndim == 2 or not image.size:
+        return False
+    row = image[image.shape[0] // 2, ::8]  # settles it for pictures with colour, at no cost
+    if not np.array_equal(row[:, 0], row[:, 2]):
+        return False
+    blue, green, red = image[:, :, 0], image[:, :, 1], image[:, :, 2]
+    return np.array_equal(blue, green) and np.array_equal(blue, red)
 
 
 def _address_of(image: Image) -> int:

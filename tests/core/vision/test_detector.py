@@ -137,6 +137,15 @@ def test_a_monochrome_camera() -> None:
     assert one.range == pytest.approx(4.0, rel=0.01)
 
 
+def test_grey_in_three_channels_is_grey() -> None:
+    image = picture([pole(13, 4.0, 0.1)])[:, :, 1]
+    assert only(np.ascontiguousarray(image)).id == 13
+    assert ALL.detect(np.dstack([image] * 3)) == ALL.detect(np.ascontiguousarray(image))
+    tinted = np.dstack([image] * 3)
+    tinted[image.shape[0] // 2, 0, 2] += 1  # one pixel with colour: a picture with hardly any
+    assert ALL.detect(tinted) == []
+
+
 def test_cut_off_by_the_side_of_the_picture() -> None:
     bearing = CAMERA.half_view - 0.002
     one = only(picture([pole(13, 2.2, bearing)]))
@@ -279,16 +288,24 @@ def test_a_covered_segment_is_not_guessed_where_a_bar_is_out_of_the_picture() ->
 
 
 def post(
-    code: str, unit: int, seed: int, *, longer: int = 0, board: bool = False, bars: bool = True
+    code: str,
+    unit: int,
+    seed: int,
+    *,
+    longer: int = 0,
+    board: bool = False,
+    bars: bool = True,
+    wall: float = 155.0,
 ) -> Image:
     """A painted post in front of a grey wall or an orange board.
 
     Args:
         code: from top to bottom, "1" for bright.
+        wall: how bright the wall is, about.
         longer: segments of bright paint that follow at either end.
         bars: whether the two segments at either end are painted at all.
     """
-    image = np.full((300, 400, 3), (150.0, 155.0, 160.0))
+    image = np.full((300, 400, 3), (wall - 5, wall, wall + 5))
     if board:
         image[:, 140:260] = (60.0, 135.0, 225.0)
     across = (np.arange(400) - 200.0) / (0.7 * unit)
@@ -340,6 +357,16 @@ def test_a_pole_hides_what_is_behind_it(unit: int) -> None:
         assert only(stripes(code, unit, unit, 1.0)).id == number
         for fainter in (0.0, 0.1, 0.2):
             assert ALL.detect(stripes(code, unit, unit, fainter)) == []
+
+
+@pytest.mark.parametrize("bits", SUPPORTED_BITS)
+def test_codes_with_one_bright_bit_are_read_before_black(bits: int) -> None:
+    """Only their few bright segments stand out there."""
+    some = LandmarkDetector(CAMERA, {1 << bit: LandmarkKind(bits=bits) for bit in range(bits)})
+    for bit in range(bits):
+        for unit in (4, 6, 9):
+            image = post(encode(1 << bit, bits), unit, bit, wall=12.0)
+            assert only(image, some).id == 1 << bit
 
 
 def test_a_grey_ladder_is_no_landmark() -> None:

@@ -67,12 +67,13 @@ static double distance(const double *one, const double *other, int channels)
 }
 
 /* Mean difference of light between the segments and what is beside them, of bright - dark, both
- * sides together; a side that is not in the picture counts as the other one. */
+ * sides together; a side that is not in the picture counts as the other one. Bright and dark segments
+ * count as much as each other, however few of either a code has. */
 double eye_apart(const eye_picture *p, const eye_upright *u, const eye_scale *scale,
                  const eye_side *side, const char *code, int segments)
 {
-    double sum[PARTS] = {0}, colour[2][3] = {{0}};
-    int number[PARTS] = {0}, with[2] = {0};
+    double sum[PARTS][2] = {{0}}, mean[PARTS] = {0}, colour[2][3] = {{0}};
+    int number[PARTS][2] = {{0}}, with[2] = {0};
     for (int i = 0; i < segments; i++) {
         double light[PARTS][3];
         int seen[PARTS], bright = code[i] == '1';
@@ -84,18 +85,22 @@ double eye_apart(const eye_picture *p, const eye_upright *u, const eye_scale *sc
         with[bright]++;
         for (int k = LEFT; k <= RIGHT; k++)
             if (seen[k]) {
-                sum[k] += distance(light[INSIDE], light[k], p->channels);
-                number[k]++;
+                sum[k][bright] += distance(light[INSIDE], light[k], p->channels);
+                number[k][bright]++;
             }
     }
-    if (!with[0] || !with[1] || !(number[LEFT] + number[RIGHT]))
+    for (int k = LEFT; k <= RIGHT; k++) {
+        int known = number[k][0] && number[k][1];
+        mean[k] = known ? (sum[k][0] / number[k][0] + sum[k][1] / number[k][1]) / 2 : -1;
+    }
+    if (!with[0] || !with[1] || (mean[LEFT] < 0 && mean[RIGHT] < 0))
         return 0;
     for (int c = 0; c < 3; c++) {
         colour[0][c] /= with[0];
         colour[1][c] /= with[1];
     }
-    double left = number[LEFT] ? sum[LEFT] / number[LEFT] : sum[RIGHT] / number[RIGHT];
-    double right = number[RIGHT] ? sum[RIGHT] / number[RIGHT] : left;
+    double left = mean[LEFT] < 0 ? mean[RIGHT] : mean[LEFT];
+    double right = mean[RIGHT] < 0 ? left : mean[RIGHT];
     double contrast = distance(colour[1], colour[0], p->channels);
     return contrast > 0 ? (left + right) / contrast : 0;
 }

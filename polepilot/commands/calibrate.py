@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -79,17 +80,19 @@ def camera(
         read_pictures,
     )
     from polepilot.commands.detect import kinds_of
+    from polepilot.commands.drawings import place_for
 
     files = list(pictures or ())
     if board_out is not None:
         if files:
             raise InputError("--board-out makes a board to print: expected no pictures with it.")
-        typer.echo(
-            write_board(parse_board(squares, square, marker, dictionary), board_out), err=as_json
-        )
+        made = write_board(parse_board(squares, square, marker, dictionary), board_out)
+        typer.echo(json.dumps(made.document) if as_json else made.words)
         return
     if not files:
         raise InputError("no picture is given: expected at least one.")
+    if annotate is not None:
+        place_for(annotate, files)  # before the work
     target = Target(config, write, as_json)
     settings = target.settings()
     if board:

@@ -7,6 +7,7 @@ import re
 import struct
 import zlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,15 +46,29 @@ def parse_board(squares: str, square: float, marker: float, dictionary: str) -> 
         raise InputError(f"{option}{error.message}") from error
 
 
-def write_board(board: Board, out: Path) -> str:
-    """Draw the board to scale as PDF, SVG or PNG; returns what was made, in words."""
+@dataclass(frozen=True, slots=True)
+class PrintedBoard:
+    """A board that was drawn to scale, for people and for programs."""
+
+    words: str
+    document: dict[str, Any]
+    """The ``--json`` document; lengths in metres."""
+
+
+def write_board(board: Board, out: Path) -> PrintedBoard:
+    """Draw the board to scale as PDF, SVG or PNG.
+
+    Raises:
+        InputError: no name of such a file, no such size of paper or picture, or not writable.
+    """
     suffix = out.suffix.lower()
     if suffix not in (".pdf", ".svg", ".png"):
         raise InputError(f"--board-out {out}: expected a name that ends with .pdf, .svg or .png.")
     size = f"{board.width * 1000:g} x {board.height * 1000:g} mm"
     if suffix == ".png":
         write_whole({out: board_png(board)}, "--board-out")
-        return f"{out}: the board, {size}, at {_DPI} dots per inch or a little off; print to scale"
+        words = f"{out}: the board, {size}, at {_DPI} dots per inch or a little off; print to scale"
+        return PrintedBoard(words, _board_document(board, out))
     from polepilot.core.printing.board import board_drawing
     from polepilot.core.printing.pdf import pdf_bytes
     from polepilot.core.printing.svg import svg_text
@@ -66,7 +81,23 @@ def write_board(board: Board, out: Path) -> str:
     sheet = drawing.sheets[0]
     data = pdf_bytes(drawing) if suffix == ".pdf" else svg_text(sheet).encode()
     write_whole({out: data}, "--board-out")
-    return f"{out}: the board, {size}, on paper of {sheet.width:g} x {sheet.height:g} mm"
+    paper = [sheet.width / 1000, sheet.height / 1000]
+    return PrintedBoard(
+        f"{out}: the board, {size}, on paper of {sheet.width:g} x {sheet.height:g} mm",
+        {**_board_document(board, out), "paper": paper},
+    )
+
+
+def _board_document(board: Board, out: Path) -> dict[str, Any]:
+    return {
+        "file": str(out),
+        "squares": [board.columns, board.rows],
+        "square": board.square,
+        "marker": board.marker,
+        "dictionary": board.dictionary.upper(),
+        "width": board.width,
+        "height": board.height,
+    }
 
 
 def board_png(board: Board) -> bytes:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from polepilot.commands.drawings import real
 from polepilot.commands.outcome import Outcome
 from polepilot.core.errors import ImageError, InputError
 
@@ -40,15 +41,23 @@ class Picture:
 
 
 def read_pictures(files: Sequence[str]) -> list[Picture]:
-    """All ``files``, which have to be of one size.
+    """All ``files``, which have to be different and of one size.
 
     Raises:
         ImageError: some cannot be read, or differ in size; all of them are named.
+        InputError: one of them is given twice, by whatever name.
     """
     from polepilot.core.vision.images import read_image
 
     if not files:
         raise InputError("no picture is given: expected at least one.")
+    names: dict[str, str] = {}
+    for file in files:
+        place = real(file)
+        if place in names:
+            also = "" if names[place] == file else f", first as {names[place]}"
+            raise InputError(f"{file}: is given twice{also}: expected different pictures.")
+        names[place] = file
     pictures, problems = [], []
     for file in files:
         try:
@@ -136,20 +145,27 @@ def parse_distances(options: Sequence[str], files: Sequence[str]) -> list[float]
     """A distance per file from ``3.0``, ``3.0 4.5`` (in order), ``FILE=3.0`` or ``FILES.csv``.
 
     Raises:
-        InputError: a number is none, a name fits no picture, or a picture has no distance.
+        InputError: a number is none, a name fits no picture, or a picture has no distance or two.
     """
     plain: list[float] = []
     named: dict[str, float] = {}
     for text in options:
         name, equals, number = text.rpartition("=")
         if equals:
-            named[_picture_named(name, files, f"--distance {text}")] = _metres(
-                number, f"--distance {text}"
-            )
+            entries = [(f"--distance {text}", name, number)]
         elif text.lower().endswith(".csv"):
-            named |= _distances_in(Path(text), files)
+            entries = _entries_in(Path(text))
         else:
             plain.append(_metres(text, f"--distance {text}"))
+            continue
+        for where, name, number in entries:
+            file = _picture_named(name, files, where)
+            if file in named:
+                raise InputError(
+                    f"{where}: {file} has a distance already, {named[file]:g} m: expected one for "
+                    "each picture."
+                )
+            named[file] = _metres(number, where)
     rest = [file for file in files if file not in named]
     if len(plain) == 1:
         plain *= len(rest)
@@ -166,15 +182,20 @@ def parse_distances(options: Sequence[str], files: Sequence[str]) -> list[float]
     return [named[file] if file in named else next(in_order) for file in files]
 
 
-def _distances_in(path: Path, files: Sequence[str]) -> dict[str, float]:
-    """Rows of ``picture,metres``; a first row that is a heading is passed over."""
+def _entries_in(path: Path) -> list[tuple[str, str, str]]:
+    """Rows of ``picture,metres``, each after where it stands, for messages.
+
+    A first row that is a heading is passed over.
+    """
     try:
         text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        why = getattr(error, "strerror", None) or "no text"
+        table = list(csv.reader(text.splitlines()))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        no_text = "no text" if isinstance(error, UnicodeDecodeError) else error
+        why = getattr(error, "strerror", None) or no_text
         raise InputError(f"--distance {path}: cannot be read ({why}).") from error
-    found: dict[str, float] = {}
-    rows = [row for row in csv.reader(text.splitlines()) if any(cell.strip() for cell in row)]
+    found: list[tuple[str, str, str]] = []
+    rows = [row for row in table if any(cell.strip() for cell in row)]
     for number, row in enumerate(rows, start=1):
         where = f"{path}: row {number}"
         if len(row) != 2:
@@ -182,7 +203,7 @@ def _distances_in(path: Path, files: Sequence[str]) -> dict[str, float]:
         name, metres = (cell.strip() for cell in row)
         if number == 1 and not any(character.isdigit() for character in metres):
             continue
-        found[_picture_named(name, files, where)] = _metres(metres, where)
+        found.append((where, name, metres))
     return found
 
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
+from polepilot.commands.drawings import encoded
 from polepilot.commands.files import write_whole
-from polepilot.core.errors import InputError
 
 if TYPE_CHECKING:
     from polepilot.core.observation import Image
@@ -66,10 +66,10 @@ class Tile:
 
 
 def write_sheet(tiles: Sequence[Tile], out: Path, option: str = "--annotate") -> None:
-    """All tiles in rows of at most three, as a PNG or JPEG file.
+    """All tiles in rows of at most three, as a PNG or JPEG file (``drawings.place_for``).
 
     Raises:
-        InputError: ``out`` cannot be written.
+        InputError: ``out`` cannot be written, or is too large for such a file.
     """
     pictures = [tile.done() for tile in tiles]
     across = min(len(pictures), _MOST_ACROSS)
@@ -81,9 +81,4 @@ def write_sheet(tiles: Sequence[Tile], out: Path, option: str = "--annotate") ->
         row, column = divmod(number, across)
         y, x = row * height, column * width
         sheet[y : y + picture.shape[0], x : x + picture.shape[1]] = picture
-    if out.suffix.lower() not in (".png", ".jpg", ".jpeg"):
-        raise InputError(f"{option} {out}: expected a file whose name ends with .png or .jpg.")
-    done, data = cv2.imencode(out.suffix.lower(), sheet)
-    if not done:
-        raise InputError(f"{option} {out}: the picture is too large to be written.")
-    write_whole({out: data.tobytes()}, option)
+    write_whole({out: encoded(sheet, out, option)}, option)

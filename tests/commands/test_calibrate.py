@@ -186,6 +186,39 @@ def test_the_picture_of_what_was_found(at: Path, tmp_path: Path, capsys: Capture
     assert drawn.shape[1] == 3 * 800
 
 
+@pytest.mark.parametrize("board", [[], ["--board"]])
+@pytest.mark.parametrize("name", ["4m.png", "./4m.png", "link.png"])
+def test_drawing_spares_the_pictures(
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    board: list[str],
+    name: str,
+    capsys: Captured,
+) -> None:
+    shutil.copy(folder / "4m.png", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    Path("link.png").symlink_to("4m.png")
+    before = Path("4m.png").read_bytes()
+    # Told before anything else is looked at: the other picture is none.
+    Path("text.png").write_text("hello")
+    words = ["4m.png", "text.png", *(board or ["--distance", "4", "--id", "13"])]
+    assert run(["calibrate", "camera", *words, "--annotate", name]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err == f"--annotate {Path(name)}: is a picture to look at; expected a new file.\n"
+    assert Path("4m.png").read_bytes() == before
+
+
+def test_a_list_with_an_endless_field(at: Path, tmp_path: Path, capsys: Captured) -> None:
+    tape = tmp_path / "tape.csv"
+    tape.write_text(f"4m.png,{'4' * 140_000}\n")
+    assert run(["calibrate", "camera", "4m.png", "--distance", str(tape)]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert err.startswith(f"--distance {tape}: cannot be read (field larger than")
+
+
 def test_distances() -> None:
     files = ["a.png", "b/c.png", "d.png"]
     assert parse_distances(["3"], files) == [3, 3, 3]
@@ -208,6 +241,11 @@ def test_distances_from_a_list(tmp_path: Path) -> None:
     path = tmp_path / "tape.csv"
     path.write_text('picture,metres\na.png,3.0\n\n"c.png", 4.5\n')
     assert parse_distances([str(path)], ["a.png", "x/c.png"]) == [3.0, 4.5]
+    with pytest.raises(InputError, match=r"row 2: a\.png has a distance already, 2 m"):
+        parse_distances(["a.png=2", str(path)], ["a.png", "x/c.png"])
+    path.write_text("a.png,3.0\na.png,3.1\n")
+    with pytest.raises(InputError, match=r"tape.csv: row 2: a\.png has a distance already, 3 m"):
+        parse_distances([str(path)], ["a.png"])
     path.write_text("a.png,3.0\nc.png,far\n")
     with pytest.raises(InputError, match=r"tape.csv: row 2: expected metres"):
         parse_distances([str(path)], ["a.png", "c.png"])
@@ -237,6 +275,13 @@ def test_distances_from_a_list(tmp_path: Path) -> None:
         (["4m.png", "--distance", "4", "--annotate", "no/a.png"], "--annotate no/a.png"),
         (["4m.png", "small.png", "--distance", "4"], "small.png: has 200 x 150 pixels"),
         (["text.png", "gone.png", "--distance", "4"], "gone.png"),
+        (["4m.png", "4m.png", "--distance", "4"], "4m.png: is given twice: expected"),
+        (["4m.png", "./4m.png", "--distance", "4"], "./4m.png: is given twice, first as 4m.png"),
+        (["4m.png", "./4m.png", "--board"], "./4m.png: is given twice, first as 4m.png"),
+        (
+            ["4m.png", "--distance", "4m.png=4", "--distance", "4m.png=5"],
+            "--distance 4m.png=5: 4m.png has a distance already, 4 m",
+        ),
         (["4m.png", "--board", "--distance", "4"], "--distance is given with --board"),
         (["4m.png", "--board"], "0 of 1 pictures show enough of the board"),
         (["4m.png", "--board", "--squares", "9"], "--squares is '9'"),
@@ -321,13 +366,20 @@ def test_the_board_itself(tmp_path: Path, capsys: Captured) -> None:
     across, down, unit = struct.unpack(">IIB", data[place : place + 9])
     assert (across, unit) == (down, 1)
     assert picture.shape[1] / across == pytest.approx(8 * 0.030, rel=1e-3)
-    for name in ("board.pdf", "board.svg"):
+    for name in ("board.pdf", "board.svg", "board.png"):
         out = tmp_path / name
-        assert run(["calibrate", "camera", "--board-out", str(out), "--json"]) == 0
-        captured = capsys.readouterr()
-        assert captured.out == ""
-        assert "297 x 210 mm" in captured.err
+        assert run(["calibrate", "camera", "--board-out", str(out)]) == 0
+        assert ("297 x 210 mm" in capsys.readouterr().out) == (out.suffix != ".png")
         assert out.stat().st_size > 5000
+        out.unlink()
+        made = answer(["calibrate", "camera", "--board-out", str(out)], capsys)
+        assert out.stat().st_size > 5000
+        assert made["file"] == str(out)
+        assert (made["squares"], made["square"], made["marker"]) == ([9, 6], 0.030, 0.022)
+        assert (made["dictionary"], made["width"]) == ("4X4_50", pytest.approx(0.27))
+        assert made["height"] == pytest.approx(0.18)
+        if out.suffix != ".png":
+            assert made["paper"] == pytest.approx([0.297, 0.210])
     assert Board() == BOARD
 
 

@@ -20,6 +20,8 @@ TEN_BITS, SIXTEEN_BITS = 1023, 65535
 """Largest counts of the converter: of the boards that we know, and of the link's field."""
 DIRECTION_SIGMA = math.radians(0.3)
 """How well a person points the camera into a known direction."""
+ROUNDING_SIGMA = 1 / math.sqrt(12)
+"""Of a converter that says whole counts, counts."""
 
 _GOOD, _FAIR = math.radians(0.5), math.radians(1.5)
 """Largest residual, and largest doubt at the ends of the range."""
@@ -101,7 +103,8 @@ def fit_line(directions: Sequence[KnownDirection], unit: PanUnit) -> LineFit:
     residual = line.zero + scale * adc - angle
     freedom = len(directions) - 2
     spread = math.sqrt(float(residual @ residual) / freedom) if freedom else 0.0
-    sigma = max(spread, DIRECTION_SIGMA)
+    # Residuals show what a count's rounding does as well; without any it has to be told.
+    sigma = max(spread, math.hypot(DIRECTION_SIGMA, scale * ROUNDING_SIGMA))
     moment = float((adc - middle) @ (adc - middle))
     ends = (line.adc(unit.minimum), line.adc(unit.maximum))
     low, high = (

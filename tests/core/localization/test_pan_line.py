@@ -54,6 +54,37 @@ def test_two_directions() -> None:
     assert "span 10° only" in near.notes[0]
 
 
+def test_counts_are_whole_numbers() -> None:
+    # A count apart may be any slope: the ends of the range, 120 counts away, are anywhere.
+    next_to_each_other = known((512, 0), (513, 90))
+    assert min(next_to_each_other.sigma_at) > math.radians(30)
+    verdict = judge(next_to_each_other)
+    assert verdict.grade == "poor"
+    assert "take directions farther apart" in verdict.reason
+    # Five degrees per count are coarse, even where the counts say exactly that.
+    coarse = known(*((512 + count, 5.0 * count) for count in (-24, -12, 0, 12, 24)))
+    assert judge(coarse).grade == "fair"
+    # At 0.27 degrees per count the rounding adds little to what a person's eye does.
+    fine = fit_line(directions(100, 300, 700, 900), UNIT)
+    end = TRUE.adc(UNIT.minimum)
+    by_eye = math.radians(0.3) * math.sqrt(1 / 4 + (500 - end) ** 2 / 400_000)
+    assert by_eye < fine.sigma_at[0] < 1.05 * by_eye
+
+
+def test_the_spread_of_rounding_is_what_is_believed() -> None:
+    rng = np.random.default_rng(5)
+    missed = []
+    for _ in range(300):
+        line = PanLine(math.radians(-140), math.radians(2.0))
+        counts = np.array([20.0, 60.0]) + rng.uniform(-0.5, 0.5, 2)
+        read = [KnownDirection(float(np.rint(c)), line.angle(float(c))) for c in counts]
+        fit = fit_line(read, UNIT)
+        end = UNIT.maximum - line.angle(fit.line.adc(UNIT.maximum))
+        missed.append(end / fit.sigma_at[1])
+    # Rounding alone, without the 0.3 degrees of the person.
+    assert 0.7 < float(np.std(missed)) < 1.1
+
+
 def test_the_present_calibration_as_a_line() -> None:
     line = PanLine.of(UNIT)
     for adc in (0, 300, 1023):

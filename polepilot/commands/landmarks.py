@@ -49,14 +49,16 @@ def print_landmarks(
     ] = "A4",
     overlap: Annotated[float, typer.Option(help="Strips and flaps to glue, mm.")] = 10.0,
     bright: Annotated[
-        str | None, typer.Option(metavar="#RRGGBB", help="Bright colour; default: orange.")
-    ] = None,
+        str,
+        typer.Option(help="Colour of bright segments, as for detect: orange, green, #00a040, ..."),
+    ] = "orange",
     dark: Annotated[
         str | None, typer.Option(metavar="#RRGGBB", help="Dark colour; default: black.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document.")] = False,
 ) -> None:
     """Draw landmarks to true scale, to be cut out and wrapped around tubes or stuck on walls."""
+    from polepilot.commands.detect import paint_of
     from polepilot.commands.files import write_whole
     from polepilot.core.printing.drawing import Ink
     from polepilot.core.printing.job import ORANGE, RICH_BLACK, PrintJob
@@ -73,8 +75,8 @@ def print_landmarks(
         kind = LandmarkKind(bits, segment, diameter, "flat" if shape == "flat" else "cylinder")
         chosen = _chosen(ids, bits, count)
         sheet = parse_paper(paper)
-    with _naming_options("--bright: "):
-        bright_ink = ORANGE if bright is None else Ink(bright)
+    paint = paint_of(bright)
+    bright_ink = ORANGE if paint.rgb == ORANGE.rgb else Ink(paint.rgb)
     with _naming_options("--dark: "):
         dark_ink = RICH_BLACK if dark is None else Ink(dark)
     with _naming_options():

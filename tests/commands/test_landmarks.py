@@ -6,11 +6,14 @@ import json
 import os
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 from printed import read_pdf, read_svg, rulers
 
 from polepilot.commands.main import run
 from polepilot.core.landmark import SUPPORTED_BITS, id_set, parse_ids, spacing
+from polepilot.core.vision.paint import COLOURS, Paint
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -73,6 +76,33 @@ def test_colours_are_as_asked(capsys: pytest.CaptureFixture[str]) -> None:
     assert {color for _, color in sheet.boxes} == {(1, 1, 1), (16 / 255, 32 / 255, 48 / 255)}
 
 
+@pytest.mark.parametrize(
+    "bright", [*COLOURS, " Green ", "#00A041", "#808080", "#a08080", "#303030", "beige", "#12", ""]
+)
+def test_bright_is_what_detect_takes(bright: str, capsys: pytest.CaptureFixture[str]) -> None:
+    cv2.imwrite("a.png", np.zeros((30, 40, 3), np.uint8))
+    taken = run(["detect", "a.png", "--bright", bright])
+    told = capsys.readouterr().err
+    assert run(["landmarks", "print", "--ids", "1", "--bright", bright, "--out", "a.svg"]) == taken
+    assert capsys.readouterr().err == told
+    if bright in COLOURS:
+        assert taken == 0
+        sheet = read_svg(Path("a-2.svg").read_text("utf-8"))
+        printed = {tuple(round(255 * c) for c in color) for _, color in sheet.boxes}
+        assert Paint.parse(bright).bgr[::-1] in printed
+
+
+def test_orange_is_printed_with_the_printers_own_inks() -> None:
+    written = []
+    for number, options in enumerate([[], ["--bright", "orange"], ["--bright", "#FF6600"]]):
+        out = Path(f"{number}.pdf")
+        assert run(["landmarks", "print", "--ids", "1", *options, "--out", str(out)]) == 0
+        written.append(out.read_bytes())
+    assert written[0] == written[1] == written[2]
+    assert run(["landmarks", "print", "--ids", "1", "--bright", "red", "--out", "r.pdf"]) == 0
+    assert Path("r.pdf").read_bytes() != written[0]
+
+
 @pytest.mark.parametrize(("ids", "warned"), [("1-5", True), ("1,2,4", False), ("9", False)])
 def test_ids_that_are_too_near_are_said(
     ids: str, warned: bool, capsys: pytest.CaptureFixture[str]
@@ -117,7 +147,8 @@ def test_the_better_set_has_as_many_ids(capsys: pytest.CaptureFixture[str]) -> N
         (["--diameter", "9"], "sheets of A4"),
         (["--shape", "cone"], "--shape"),
         (["--overlap", "1"], "--overlap"),
-        (["--bright", "orange"], "--bright"),
+        (["--bright", "beige"], "--bright"),
+        (["--bright", "#a08080"], "--bright"),
         (["--dark", "#12345"], "--dark"),
         (["--bright", "#000000"], "--bright"),
         (["--out", "a.png"], "--out"),

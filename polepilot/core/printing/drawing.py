@@ -37,12 +37,17 @@ class Ink:
         return red, green, blue
 
     @property
-    def luminance(self) -> float:
-        """Relative luminance of the linear light, 0 (black) to 1 (white)."""
-        linear = (
+    def light(self) -> tuple[float, float, float]:
+        """Linear light of red, green and blue, 0 to 1."""
+        red, green, blue = (
             c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in self.channels
         )
-        return sum(w * c for w, c in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+        return red, green, blue
+
+    @property
+    def luminance(self) -> float:
+        """Relative luminance of the linear light, 0 (black) to 1 (white)."""
+        return sum(w * c for w, c in zip((0.2126, 0.7152, 0.0722), self.light, strict=True))
 
 
 BLACK = Ink("#000000", (0.0, 0.0, 0.0, 1.0))

@@ -22,6 +22,7 @@ RICH_BLACK = Ink("#000000", (0.5, 0.4, 0.4, 1.0))
 OVERLAPS = (5.0, 40.0)
 """Strips and flaps to glue, mm: from what glue needs to what paper can spare."""
 _LEAST_CONTRAST = 0.1
+"""Linear light, in the channel in which the bright ink is brightest: there edges are measured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +47,9 @@ class PrintJob:
             raise InputError(
                 f"overlap is {self.overlap:g} mm: expected {OVERLAPS[0]:g} to {OVERLAPS[1]:g} mm."
             )
-        if self.bright.luminance < self.dark.luminance + _LEAST_CONTRAST:
+        most = max(self.bright.light)
+        there = self.dark.light[self.bright.light.index(most)]
+        if most < there + _LEAST_CONTRAST or self.bright.luminance <= self.dark.luminance:
             raise InputError(
                 f"bright is {self.bright.rgb} and dark is {self.dark.rgb}:"
                 " expected bright to be much brighter than dark."

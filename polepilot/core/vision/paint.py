@@ -90,11 +90,16 @@ class Paint:
         return cls(*(int(part, 16) for part in match.groups()))
 
     def __str__(self) -> str:
-        shown = f"#{self.red:02x}{self.green:02x}{self.blue:02x}"
-        return next((name for name, colour in COLOURS.items() if colour == shown), shown)
+        return next((name for name, rgb in COLOURS.items() if rgb == self.rgb), self.rgb)
+
+    @property
+    def rgb(self) -> str:
+        """``#rrggbb``, sRGB."""
+        return f"#{self.red:02x}{self.green:02x}{self.blue:02x}"
 
     @property
     def bgr(self) -> Triple:
+        """sRGB, 0 to 255, in the order of a picture's channels: blue, green, red."""
         return self.blue, self.green, self.red
 
     @property
@@ -105,6 +110,7 @@ class Paint:
 
     @property
     def coloured(self) -> bool:
+        """Whether it has a colour to tell it from grey things by; white has none."""
         light = self._light
         return min(light) / max(light) <= _MOST_GREY
 

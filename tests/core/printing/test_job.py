@@ -325,6 +325,8 @@ def test_the_detector_reads_what_is_printed(number: int) -> None:
         ({"ids": (1,), "overlap": math.nan}, "expected 5 to 40 mm"),
         ({"ids": (1,), "bright": RICH_BLACK, "dark": ORANGE}, "much brighter"),
         ({"ids": (1,), "bright": Ink("#202020")}, "much brighter"),
+        ({"ids": (1,), "bright": Ink("#ff6600"), "dark": Ink("#ff0000")}, "much brighter"),
+        ({"ids": (1,), "bright": Ink("#1040e0"), "dark": Ink("#00a000")}, "much brighter"),
     ],
 )
 def test_impossible_jobs_are_refused(fields: dict[str, object], expected: str) -> None:

@@ -142,7 +142,7 @@ def _aruco() -> Callable[[Image], object]:
 
 
 def rendered_set(count: int = _RENDERED, seed: int = 1) -> list[Image]:
-    """Pictures of a room with three landmarks at 2 to 8 m; always the same for a seed."""
+    """Pictures of a room with three different landmarks at 2 to 8 m; always the same for a seed."""
     import math
 
     import numpy as np
@@ -158,10 +158,10 @@ def rendered_set(count: int = _RENDERED, seed: int = 1) -> list[Image]:
     images = []
     for _ in range(count):
         marks = []
-        for bearing in (-0.2, 0.0, 0.2):
+        numbers = rng.choice(np.arange(1, 16), 3, replace=False)
+        for number, bearing in zip(numbers, (-0.2, 0.0, 0.2), strict=True):
             away, off = rng.uniform(2, 8), bearing + rng.uniform(-0.06, 0.06)
-            number = int(rng.integers(1, 16))
-            marks.append(Landmark(number, away * math.cos(off), away * math.sin(off)))
+            marks.append(Landmark(int(number), away * math.cos(off), away * math.sin(off)))
         renderer = Renderer(Camera(), marks, walls, rng)
         images.append(renderer.render(Pose2D(0.0, 0.0, 0.0), 0.0))
     return images

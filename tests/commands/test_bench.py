@@ -14,7 +14,10 @@ from vision_scenes import picture, pole
 
 from polepilot.commands import bench
 from polepilot.commands.main import run
+from polepilot.core.landmark import Landmark
 from polepilot.core.observation import Image
+from polepilot.core.sim import render
+from polepilot.core.vehicle import Camera
 
 KEYS = {"frames", "ours_ms", "aruco_ms", "ratio"}
 SCENE = picture([pole(13, 3.0, 0.1)])
@@ -150,3 +153,21 @@ def test_the_rendered_set_is_always_the_same() -> None:
     first, second = bench.rendered_set(2), bench.rendered_set(2)
     assert all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
     assert not np.array_equal(first[0], first[1])
+
+
+def test_no_landmark_stands_twice_in_a_rendered_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    rooms: list[list[int]] = []
+
+    class Looked(render.Renderer):
+        def __init__(self, camera: Camera, marks: list[Landmark], *rest: Any) -> None:
+            rooms.append([mark.id for mark in marks])
+            super().__init__(camera, marks, *rest)
+
+        def render(self, *_: Any) -> Image:  # the picture itself does not matter here
+            return SCENE
+
+    monkeypatch.setattr(render, "Renderer", Looked)
+    bench.rendered_set()
+    assert len(rooms) == 60
+    assert all(len(set(ids)) == 3 and set(ids) <= set(range(1, 16)) for ids in rooms)
+    assert {number for ids in rooms for number in ids} == set(range(1, 16))

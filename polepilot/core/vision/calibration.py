@@ -158,6 +158,7 @@ class ConstantFit:
 
     @property
     def outliers(self) -> tuple[Residual, ...]:
+        """The pictures that contradict the others, in the order given; the fit left them out."""
         return tuple(r for r in self.residuals if not r.agrees)
 
 

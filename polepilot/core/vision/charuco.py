@@ -85,10 +85,12 @@ class Board:
 
     @property
     def width(self) -> float:
+        """From the left edge of the squares to the right one, metres."""
         return self.columns * self.square
 
     @property
     def height(self) -> float:
+        """From the top edge of the squares to the bottom one, metres."""
         return self.rows * self.square
 
     @property

@@ -54,6 +54,7 @@ class Lens:
 
     @property
     def ideal(self) -> bool:
+        """Whether it bends nothing: every coefficient is zero."""
         return not any(astuple(self))
 
     @property

@@ -206,7 +206,7 @@ class Kernel:
 
 def _is_grey(image: Image) -> bool:
     """Whether three channels say the same everywhere, as a monochrome camera's often do."""
-    if image.ndim == 2 or not image.size:
+    if image.shape[2:] != (3,) or not image.size:
         return False
     row = image[image.shape[0] // 2, ::8]  # settles it for pictures with colour, at no cost
     if not np.array_equal(row[:, 0], row[:, 2]):

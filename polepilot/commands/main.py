@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import sys
@@ -57,6 +58,9 @@ app.add_typer(bench.app, name="bench", help="Measure how fast and how well parts
 
 def main() -> None:
     """Run the command line; never shows a traceback for a user's mistake."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # Names of files may be any bytes: what is no text is shown escaped.
+        sys.stdout.reconfigure(errors="backslashreplace")
     sys.exit(run(sys.argv[1:]))
 
 

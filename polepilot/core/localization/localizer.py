@@ -22,6 +22,7 @@ from polepilot.core.localization.ekf import PoseFilter
 from polepilot.core.localization.events import EventLog
 from polepilot.core.localization.events import LocalizerEvent as LocalizerEvent
 from polepilot.core.localization.fix import Fix
+from polepilot.core.localization.given_up import GivenUp
 from polepilot.core.localization.health import LandmarkHealth, Verdict
 from polepilot.core.localization.noise import NoiseModel as NoiseModel
 from polepilot.core.localization.odometry import Following, OdometryHistory
@@ -48,8 +49,9 @@ _CHANCE = 0.01
 """How likely it may be that missing landmarks are just overlooked before the pose is given up."""
 _SURVEYED = 16
 """For so many landmarks the map's error is estimated; for the others it counts as noise."""
-_RESUMING = 2
-"""Sightings that bring a pose back that was given up."""
+_UNFOLLOWED = 5.0
+"""Without a picture, a pose is carried along once it is so much older, seconds, than measurements
+may come late: the odometry reaches back 15 s, and motion before that would be forgotten."""
 
 
 class Localizer:
@@ -99,8 +101,7 @@ class Localizer:
         self._before: tuple[float, Filter, Following] | None = None
         self._track: Track | None = None
         self._ahead: Track | None = None
-        self._given_up: Track | None = None
-        self._agreeing = 0
+        self._given_up: GivenUp | None = None
         self._measured: tuple[float, Pose2D] | None = None
         self._predicted: tuple[float, Pose2D] | None = None
         self._last_agreed: dict[int, float] = {}
@@ -170,6 +171,7 @@ class Localizer:
 
     def add_odometry(self, odometry: Odometry) -> None:
         """How the robot moves from ``odometry.stamp`` on."""
+        self._follow(odometry.stamp)
         self._history.add(odometry)
         if self._ahead is not None and odometry.stamp < self._ahead.stamp:
             self._ahead = None
@@ -216,7 +218,8 @@ class Localizer:
                 self._history.retune(following)
                 track = None
         # A pose that was never confirmed is not to be taken up again by the same two landmarks.
-        self._given_up, self._agreeing = track if self._trial.over else None, 0
+        keep = self._trial.over
+        self._given_up = GivenUp(track, self.settings) if track is not None and keep else None
         self._track = self._ahead = self._before = None
         self._measured = self._predicted = None
         self._belief.seek(reason)
@@ -250,32 +253,17 @@ class Localizer:
 
     def _seek(self, stamp: float, picture: list[RangeBearing]) -> None:
         """Without a pose: a picture may lead to one, or back to the one that was given up."""
-        if self._given_up is not None and self._resumed(self._given_up, stamp, picture):
+        given_up, moved = self._given_up, self._health.moved
+        known = [(m, self._landmarks[m.landmark]) for m in picture if m.landmark not in moved]
+        if given_up is not None and given_up.agrees(self._history, stamp, known):
+            track = given_up.track
+            track.moving = 0.0
+            self._accept(track, stamp, {m.landmark for m in picture})
+            self._measured = (stamp, track.filter.pose)
+            self._events.add(LocalizerEvent(stamp, "resumed", "The landmarks agree with it again."))
             return
         self._collect(picture)
         self._try_fix(stamp)
-
-    def _resumed(self, track: Track, stamp: float, picture: list[RangeBearing]) -> bool:
-        """Whether the pose that was given up is to be believed again."""
-        if stamp < track.stamp - 1e-9:
-            return False
-        track.predict(self._history, stamp)
-        for measurement in picture:
-            if measurement.landmark in self._health.moved:
-                continue
-            mark = self._landmarks[measurement.landmark]
-            taken, gap = track.filter.take(measurement, mark, track.tolerance)
-            if taken:
-                self._agreeing += 1
-            elif gap > self.settings.tolerance:
-                self._agreeing = 0
-        if self._agreeing < _RESUMING or track.sigma > self.settings.degraded_sigma:
-            return False
-        track.moving = 0.0
-        self._accept(track, stamp, {m.landmark for m in picture})
-        self._measured = (stamp, track.filter.pose)
-        self._events.add(LocalizerEvent(stamp, "resumed", "The landmarks agree with it again."))
-        return True
 
     def _collect(self, measurements: Sequence[RangeBearing]) -> None:
         """Keep for a fix; landmarks known to have been moved would only mislead it."""
@@ -450,6 +438,15 @@ class Localizer:
         if self._presence.saw(number, measurement.range, off_axis, track.filter.pose):
             text = f"Landmark {number} is seen again."
             self._events.add(LocalizerEvent(measurement.stamp, "landmark_back", text, number))
+
+    def _follow(self, now: float) -> None:
+        """Carry a pose along that has not been corrected for long, before its odometry goes."""
+        until = now - self.settings.late if math.isfinite(now) else -math.inf
+        given_up = self._given_up
+        for track in (self._track, None if given_up is None else given_up.track):
+            if track is not None and track.stamp < until - _UNFOLLOWED:
+                track.predict(self._history, until)
+                track.keep()
 
     def _predicted_to(self, stamp: float, track: Track) -> Track:
         """The track at ``stamp``, or at its last measurement where that came later."""

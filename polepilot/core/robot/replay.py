@@ -142,6 +142,10 @@ def replay(
     # Dead reckoning for comparison takes the commands as they are.
     commands = OdometryHistory(dataset.vehicle.wheelbase)
     reckoned: tuple[float, Pose2D] | None = None
+    # Likewise from frame to frame: the localizer's odometry does not reach back to a measurement
+    # that is long past.
+    measured: tuple[float, Pose2D] | None = None
+    taken: tuple[float, Pose2D] | None = None
     result = ReplayResult()
     last = dataset.samples[0].stamp if dataset.samples else 0.0
     command = Odometry(last, 0.0, 0.0)
@@ -177,8 +181,11 @@ def replay(
             result.found.append(len(result.estimates))
         if estimate is not None:
             result.estimates.append(estimate)
-            seen_at, seen = localizer.measured or (stamp, estimate.pose)
-            result.measured.append((stamp, localizer.history.advance(seen, seen_at, stamp)))
+            if measured is None or localizer.measured != taken:
+                taken = localizer.measured
+                measured = taken or (stamp, estimate.pose)
+            measured = (stamp, localizer.history.advance(measured[1], measured[0], stamp))
+            result.measured.append(measured)
         if reckoned is not None:
             reckoned = (stamp, commands.advance(reckoned[1], reckoned[0], stamp))
         elif estimate is not None:

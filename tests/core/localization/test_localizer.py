@@ -317,6 +317,21 @@ def test_standing_blind_loses_nothing() -> None:
     assert estimate.status is Status.TRACKING
 
 
+@pytest.mark.parametrize("delay", [0.0, 0.15])
+def test_motion_is_remembered_however_long_it_is_ago(delay: float) -> None:
+    """Driven without a landmark, then parked for long; the odometry may come a little late."""
+    localizer = standing()
+    for tick in range(10, 600):
+        now = 0.1 * tick
+        speed = 0.3 if 1.0 <= now < 7.0 else 0.0
+        localizer.add_odometry(Odometry(now - delay, speed, 0.0))
+        estimate = localizer.estimate(now)
+    assert estimate is not None
+    assert estimate.pose.distance_to((1.8 - FORWARD, 0.0)) < 0.1
+    assert estimate.status is Status.DEGRADED
+    assert estimate.position_sigma > 0.1
+
+
 def test_unknown_and_broken_measurements_are_left_out() -> None:
     localizer = standing()
     before = localizer.estimate(1.0)

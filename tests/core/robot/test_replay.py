@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,9 @@ import pytest
 from core.localization.generator import FORWARD, WHEELBASE, Recording, record
 
 from polepilot.core.errors import DatasetError, ImageError
-from polepilot.core.observation import Detection, Odometry, PanReading
-from polepilot.core.robot.dataset import FrameFile, read_dataset
+from polepilot.core.landmark import Landmark
+from polepilot.core.observation import Detection, Odometry, PanReading, RangeBearing
+from polepilot.core.robot.dataset import FrameFile, Sighted, read_dataset
 from polepilot.core.robot.replay import PanTrack, ReplayResult, replay, smooth, write_results
 from polepilot.core.trajectory import (
     Trajectory,
@@ -129,6 +131,25 @@ def test_the_replay_is_causal(tmp_path: Path) -> None:
     for a, b in zip(whole.estimates, part.estimates, strict=False):
         assert a.stamp == b.stamp
         assert a.pose == b.pose
+
+
+def test_what_was_measured_is_carried_along_for_as_long_as_it_takes(tmp_path: Path) -> None:
+    """Nothing is seen any more: 1.2 m are driven, and then it stands."""
+    marks = {n: Landmark(n, *at) for n, at in enumerate([(4.0, 0.0), (4.0, 3.0), (0.0, 3.0)], 1)}
+    samples: list[Any] = []
+    for tick in range(600):
+        now = 0.1 * tick
+        samples += [Odometry(now, 0.3 if 5.0 <= now < 9.0 else 0.0, 0.0), PanReading(now, 0.0)]
+        seen = [
+            RangeBearing(now, n, math.dist(m.position, (FORWARD, 0.0)), bearing, 0.01, 0.001)
+            for n, m in marks.items()
+            for bearing in [math.atan2(m.y, m.x - FORWARD)]
+        ]
+        samples.append(Sighted(now, tuple(seen) if now < 5.0 else (), 0.0))
+    dataset = read_dataset(write(tmp_path / "run"))
+    result = replay(replace(dataset, landmarks=marks, samples=tuple(samples)), lambda _: [])
+    assert result.measured[-1][1].distance_to((1.2, 0.0)) < 0.05
+    assert result.measured[-1][1].distance_to(result.estimates[-1].pose.position) < 0.05
 
 
 def test_looking_back_is_better_than_looking_ahead(tmp_path: Path) -> None:

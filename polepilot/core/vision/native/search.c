@@ -11,6 +11,7 @@
 #define ROWS_APART 3     /* every third row is asked for colour: the farthest end bar is as high */
 #define LINE 64          /* bytes of a cache line */
 #define LEAST_PEAK 30    /* grey levels of colour, somewhere in a column that is looked at */
+#define LIGHT_APART (2 * EYE_APART) /* columns from one that is also read by brightness to the next */
 #define MOST_COLOUR 0.5f /* share of a column's coloured rows that a code by itself explains */
 #define LEAST_COLOURED 2 /* rows with colour, of those asked, in a column that is looked at */
 
@@ -170,15 +171,15 @@ static int explains(const eye_hits *hits, int known, int first, int last)
     return 0;
 }
 
-/* Codes in one column: near ones among the runs of its colour, and of its brightness where that does
- * not explain most of it, as JPEG and cheap sensors leave brightness sharper; far ones. ``light``: room
+/* Codes in one column: near ones among the runs of its colour, and in every second column of its
+ * brightness where that does not explain most of it, as JPEG and cheap sensors leave brightness sharper; far ones. ``light``: room
  * for a column. */
 static void look_at(eye_hits *hits, const uint8_t *signal, int first, int last, int x,
                     uint8_t *light)
 {
     int known = hits->n_hits;
     match(hits, signal, x);
-    if (!explains(hits, known, first, last) &&
+    if (x % LIGHT_APART == 0 && !explains(hits, known, first, last) &&
         eye_is_coloured(hits->picture->channels, hits->task)) {
         fill_light(hits, signal, first, last, x, light);
         match(hits, light, x);

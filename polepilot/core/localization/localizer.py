@@ -277,11 +277,13 @@ class Localizer:
         for found in search.attempts(stamp):
             if self._begin(stamp, found):
                 return
-        self._belief.seek(search.refusal.reason)
+        self._belief.seek(self._trial.refusal or search.refusal.reason)
 
     def _begin(self, stamp: float, found: Fix) -> bool:
         """Whether all that was seen fits to the fix so well that it is believed."""
         on_trial = self._trial.failed
+        if len(found.landmarks) == 2 and self._trial.refusal:
+            return False
         started = self._filter.copy()
         sightings = [(m, self._landmarks[m.landmark]) for m in self._search.used]
         share = started.begin(found, stamp, sightings, self._history)
@@ -493,5 +495,6 @@ class Localizer:
         misfit, moved = track.filter.map_misfit, self._health.moved
         suspected = self._suspicion.judge(track.stamp, len(self._landmarks), moved, misfit)
         doubted = self._doubt.spread > 0.0
-        self._belief.judge(track.stamp, track.moving, track.sigma, doubted, suspected.reason)
+        reason = suspected.reason or self._trial.doubt
+        self._belief.judge(track.stamp, track.moving, track.sigma, doubted, reason)
         return suspected

@@ -81,10 +81,10 @@ class FixSearch:
                 continue
             seen = len(chosen)
             found = self._attempt(stamp, chosen)
-            if share == 1.0:
-                refusal = self.refusal
             if found is not None:
                 yield found
+            if share == 1.0:
+                refusal = self.refusal
         self.refusal = refusal
 
     def _chosen(self, stamp: float, since: float) -> list[RangeBearing]:

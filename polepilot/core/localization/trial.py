@@ -1,8 +1,12 @@
 """Two landmarks make a pose; if one of them was moved, it is wrong, and both agree with it.
 
 A landmark that was moved round the other one keeps its distance to it, and nothing that was
-measured says so: the pose is turned round the one that stands. Until a third landmark agrees, that
-is part of the pose's covariance, and what contradicts the pose is not forgotten.
+measured says so: the pose is turned round the one that stands. That is two suppositions, one for
+each of the two. Until third landmarks that agree have ruled them out, they are part of the pose's
+covariance, and what contradicts the pose is not forgotten. A third one that stands near the pivot
+hardly moves when the pose is turned round it: it rules out the other supposition alone.
+
+Where such poses fail again and again, one moved landmark is no explanation any more.
 """
 
 from __future__ import annotations
@@ -21,6 +25,11 @@ from polepilot.core.localization.doubt import largest_sigma
 from polepilot.core.observation import RangeBearing
 
 _MOST = 200
+_OR_ELSE = ", or this is not the map of this place"
+_TELLING = 0.5
+"""A third landmark that would appear this share of the shift off its place would not agree."""
+_PATIENCE = 2
+"""After so many failed poses two landmarks give none any more."""
 
 
 @dataclass(slots=True)
@@ -38,10 +47,24 @@ class Trial:
     """Sightings of the two."""
     failed: bool = False
     """Others have contradicted the last one."""
+    failures: int = 0
+    """So many have been given up for that since one was confirmed."""
+    pivots: set[int] = field(default_factory=set)
+    """Round which of the two the pose may still be turned."""
 
     @property
     def over(self) -> bool:
         return len(self.fixed_by) != 2
+
+    @property
+    def refusal(self) -> str:
+        """Why two landmarks are to give no pose, for a person; empty where they may."""
+        if self.failures < _PATIENCE:
+            return ""
+        return (
+            f"Poses of two landmarks have failed {self.failures} times: three have to agree"
+            f"{_OR_ELSE}."
+        )
 
     @property
     def undecided(self) -> bool:
@@ -51,6 +74,9 @@ class Trial:
     def begin(self, fixed_by: Collection[int], used: Sequence[RangeBearing] = ()) -> None:
         """``used``: the sightings that led to the pose."""
         self.fixed_by = frozenset(fixed_by)
+        self.pivots = set() if self.over else set(fixed_by)
+        if self.over:
+            self.failures = 0
         self.against.clear()
         self.led[:] = () if self.over else used
         self.failed = False
@@ -62,17 +88,27 @@ class Trial:
         """
         evidence = [*self.against, *(self.led if self.failed else ())]
         self.failed = self.failed and bool(evidence)
+        self.failures += self.failed
         self.fixed_by = frozenset()
         self.against.clear()
         self.led.clear()
         return evidence
 
     def agrees(self, measurement: RangeBearing) -> None:
-        if measurement.landmark not in self.fixed_by:
-            self.begin(())
-        elif not self.over:
+        """It fits to the pose."""
+        if self.over:
+            return
+        if measurement.landmark in self.fixed_by:
             self.led.append(measurement)
             del self.led[:-_MOST]
+            return
+        third = self.landmarks[measurement.landmark].position
+        for number in tuple(self.pivots):
+            aside = self._turn * math.dist(third, self.landmarks[number].position)
+            if aside > _TELLING * self.shift:
+                self.pivots.discard(number)
+        if not self.pivots:
+            self.begin(())
 
     def contradicts(self, measurement: RangeBearing) -> str:
         """Why the pose is to be given up; empty where it is not."""
@@ -80,29 +116,53 @@ class Trial:
             return ""
         self.against.append(measurement)
         del self.against[:-_MOST]
-        counts = Counter(one.landmark for one in self.against)
-        firm = sorted(number for number, count in counts.items() if count >= 2)
+        firm = self._firm()
         if len(firm) < 2:
             return ""
         self.failed = True
         one, other = sorted(self.fixed_by)
         return (
             f"Landmarks {' and '.join(map(str, firm))} contradict the pose that {one} and {other} "
-            "have given: one of those has been moved."
+            f"have given: one of those has been moved{_OR_ELSE if self.failures else ''}."
         )
 
-    def covariance(self, pose: Pose2D) -> NDArray[np.float64]:
-        """3 x 3, of turning ``pose`` round either of the two; zeros where nothing is in doubt.
+    def _firm(self) -> list[int]:
+        """Who has contradicted the pose twice.
 
-        Where the map has no third landmark nothing better will come: the two are believed.
+        The two themselves are no witnesses against each other: then the robot was moved.
+        """
+        counts = Counter(one.landmark for one in self.against)
+        return sorted(n for n, count in counts.items() if count >= 2 and n not in self.fixed_by)
+
+    @property
+    def doubt(self) -> str:
+        """Why the pose may be wrong, for a person: a single landmark contradicts it."""
+        firm = [] if self.over else self._firm()
+        if len(firm) != 1:
+            return ""
+        one, other = sorted(self.fixed_by)
+        return (
+            f"Landmark {firm[0]} contradicts the pose that {one} and {other} have given: one of "
+            "the three has been moved."
+        )
+
+    @property
+    def _turn(self) -> float:
+        """By how much one of the two turns the pose round the other, radians."""
+        one, other = (self.landmarks[number] for number in self.fixed_by)
+        return self.shift / math.dist(one.position, other.position)
+
+    def covariance(self, pose: Pose2D) -> NDArray[np.float64]:
+        """3 x 3, of turning ``pose`` round those of the two that may be pivots.
+
+        Zeros where nothing is in doubt. Where the map has no third landmark nothing better will
+        come: the two are believed.
         """
         spread = np.zeros((3, 3))
         if not self.undecided:
             return spread
-        one, other = (self.landmarks[number] for number in self.fixed_by)
-        turn = self.shift / math.dist(one.position, other.position)
-        for mark in (one, other):
-            lever = turn * np.array([mark.y - pose.y, pose.x - mark.x, 1.0])
+        for mark in (self.landmarks[number] for number in sorted(self.pivots)):
+            lever = self._turn * np.array([mark.y - pose.y, pose.x - mark.x, 1.0])
             spread += np.outer(lever, lever)
         spread[0, 0] += self.slack**2
         spread[1, 1] += self.slack**2

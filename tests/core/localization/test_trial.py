@@ -71,6 +71,76 @@ def test_only_where_others_contradict_are_the_two_evidence_as_well() -> None:
     assert not trial.failed
 
 
+NEAR = {**MARKS, 5: Landmark(5, 4.0, 0.5)}
+"""Landmark 5 stands beside 2."""
+
+
+def test_a_third_beside_the_pivot_rules_out_one_supposition_alone() -> None:
+    """Landmark 1 was moved by 20 cm round 2: 5 stands only 2.5 cm off its place then."""
+    trial = Trial(NEAR, 0.2, 0.0)
+    trial.begin((1, 2))
+    both = trial.covariance(POSE)
+    trial.agrees(seen(5))
+    assert not trial.over
+    left = trial.covariance(POSE)
+    # Turned by 1/20 round landmark 2, from which the robot is 2 m and -1.5 m away.
+    lever = 0.05 * np.array([-1.5, -2.0, 1.0])
+    assert left == pytest.approx(np.outer(lever, lever))
+    # A turn round 1 leads elsewhere: what is left is less than both.
+    assert np.linalg.eigvalsh(both - left).min() > -1e-12
+    assert np.trace(both - left) > 0.01
+    # It says the same again; one that stands elsewhere says the rest.
+    trial.agrees(seen(5))
+    assert not trial.over
+    trial.agrees(seen(4))
+    assert trial.over
+
+
+def test_the_two_are_no_witnesses_against_themselves() -> None:
+    trial = Trial(MARKS, 0.2, 0.05)
+    trial.begin((1, 2))
+    assert [trial.contradicts(seen(n)) for n in (1, 1, 2, 2, 3)] == [""] * 5
+    assert trial.doubt == ""
+    assert trial.contradicts(seen(3)) == ""
+    assert trial.doubt == (
+        "Landmark 3 contradicts the pose that 1 and 2 have given: one of the three has been moved."
+    )
+    assert trial.contradicts(seen(1)) == ""
+    trial.agrees(seen(4))
+    assert trial.doubt == ""
+
+
+def fail(trial: Trial) -> str:
+    """A pose that others contradict, again and again, and that is given up."""
+    trial.begin((1, 2))
+    said = [trial.contradicts(seen(n)) for n in (3, 3, 4, 4, 3, 4, 3)]
+    trial.give_up()
+    trial.give_up()
+    return said[-1]
+
+
+def test_poses_of_two_that_fail_again_and_again_are_not_believed() -> None:
+    trial = Trial(MARKS, 0.2, 0.05)
+    assert fail(trial).endswith("one of those has been moved.")
+    assert trial.refusal == ""
+    assert fail(trial).endswith(
+        "one of those has been moved, or this is not the map of this place."
+    )
+    assert trial.refusal == (
+        "Poses of two landmarks have failed 2 times: three have to agree, or this is not the map "
+        "of this place."
+    )
+    trial.begin((1, 2, 3))
+    assert trial.refusal == ""
+    fail(trial)
+    trial.begin((1, 2))
+    trial.agrees(seen(3))
+    fail(trial)
+    assert trial.refusal == ""
+    fail(trial)
+    assert trial.refusal != ""
+
+
 def test_its_covariance_is_that_of_a_landmark_moved_round_the_other() -> None:
     """Landmark 2 was moved by 20 cm; the fix turns round landmark 1 and does not notice."""
     trial = Trial(MARKS, 0.2, 0.05)
@@ -159,3 +229,63 @@ def test_two_poses_of_as_many_landmarks_are_no_pose() -> None:
     assert found.landmarks == (1, 3, 4)
     assert found.outliers == (2,)
     assert math.dist(found.pose.position, POSE.position) < 1e-6
+
+
+def run(
+    mapped: dict[int, Landmark],
+    real: dict[int, tuple[float, float]],
+    order: list[int],
+    count: int,
+    row: int = 3,
+) -> list[tuple[Status, float, float, str]]:
+    """Stand at `POSE` and see one landmark after the other, each ``row`` times; status, error, sigma and reason."""
+    localizer = Localizer(mapped, Vehicle(), FORWARD)
+    localizer.add_odometry(Odometry(0.0, 0.0, 0.0))
+    rows = []
+    for index in range(count):
+        number = order[index // row % len(order)]
+        localizer.add_measurements([sight(number, 0.1 * index, real[number])])
+        if localizer.status is Status.LOST:
+            localizer.refix(localizer.reason)
+        estimate = localizer.estimate(0.1 * index)
+        off = math.nan if estimate is None else estimate.pose.distance_to(POSE.position)
+        sigma = math.nan if estimate is None else estimate.position_sigma
+        rows.append((localizer.status, off, sigma, localizer.reason))
+    return rows
+
+
+@pytest.mark.parametrize("degrees", [3.0, 5.0, 8.0])
+def test_a_third_beside_the_pivot_makes_no_wrong_pose_sure(degrees: float) -> None:
+    """Landmark 1 was moved round 2, and 5 stands beside 2: it hardly notices."""
+    turn = math.radians(degrees)
+    real = {number: mark.position for number, mark in NEAR.items()}
+    real[1] = (4.0 - 4.0 * math.cos(turn), -4.0 * math.sin(turn))
+    rows = run({n: NEAR[n] for n in (1, 2, 5)}, real, [1, 2, 5], 200)
+    tracked = [row for row in rows if row[0] is Status.TRACKING]
+    assert tracked
+    assert max(off / sigma for _, off, sigma, _ in tracked) < 3.7
+
+
+def test_of_a_map_of_another_place_no_third_pose_of_two_is_believed() -> None:
+    """All landmarks stand as in a mirror; two of them do not notice."""
+    places = {1: (0.0, 0.0), 2: (4.0, 0.0), 3: (4.5, 4.0), 4: (0.5, 5.0), 5: (-2.0, 2.0)}
+    mapped = {number: Landmark(number, -x, y) for number, (x, y) in places.items()}
+    rows = run(mapped, places, [1, 2, 3, 4, 5], 900, row=35)
+    poses = [row for row in rows if not math.isnan(row[1])]
+    assert poses
+    # Twice, for the seconds until others are seen; then never again.
+    assert len(poses) < 200
+    assert all(math.isnan(off) for _, off, _, _ in rows[200:])
+    assert rows[-1][0] is Status.FIXING
+    assert rows[-1][3].endswith("three have to agree, or this is not the map of this place.")
+
+
+def test_one_that_contradicts_a_pose_on_trial_is_said() -> None:
+    real = {number: mark.position for number, mark in MARKS.items()}
+    real[3] = (4.6, 4.0)
+    rows = run(dict(MARKS), real, [1, 2, 3, 1, 2], 15)
+    assert rows[6][0] is Status.TRACKING
+    assert rows[-1][0] is Status.DEGRADED
+    assert rows[-1][3] == (
+        "Landmark 3 contradicts the pose that 1 and 2 have given: one of the three has been moved."
+    )

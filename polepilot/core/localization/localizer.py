@@ -28,6 +28,7 @@ from polepilot.core.localization.noise import NoiseModel as NoiseModel
 from polepilot.core.localization.odometry import Following, OdometryHistory
 from polepilot.core.localization.presence import Presence
 from polepilot.core.localization.radial import RadialFilter, unfiltered
+from polepilot.core.localization.repeats import Repeats
 from polepilot.core.localization.search import FixSearch
 from polepilot.core.localization.settings import LocalizerSettings as LocalizerSettings
 from polepilot.core.localization.settings import Method as Method
@@ -108,6 +109,7 @@ class Localizer:
         self._events = EventLog()
         self._belief = Belief(self.settings, self._events, reason=self._search.refusal.reason)
         self._fixes = 0
+        self._repeats = Repeats()
 
     # ---- what is known -----------------------------------------------------------------------
 
@@ -192,9 +194,9 @@ class Localizer:
         """Landmarks seen; those of one picture share a stamp.
 
         Measurements that come after later ones are applied in their place; those that come too
-        late for that are left out, as are unknown landmarks; both are reported.
+        late for that are left out, as are unknown landmarks; both are reported. Told twice is once.
         """
-        usable = [m for m in measurements if self._usable(m)]
+        usable = [m for m in self._repeats.fresh(measurements) if self._usable(m)]
         usable.sort(key=lambda m: m.stamp)
         for stamp, group in groupby(usable, key=lambda m: m.stamp):
             picture = list(group)
@@ -416,8 +418,8 @@ class Localizer:
 
     def _contradicted(self, number: int, stamp: float, place: Point, sigma: float) -> None:
         """A landmark is not in its place though the pose is right: is it to be left out?"""
-        convict = not self._trial.undecided
-        verdict = self._health.contradicted(number, stamp, place, sigma, convict)
+        sure = not self._trial.undecided
+        verdict = self._health.contradicted(number, stamp, place, sigma, sure)
         if verdict is not None:
             self._tell(verdict, stamp)
 
@@ -485,11 +487,9 @@ class Localizer:
     def _judge_doubt(self, track: Track) -> None:
         """LOST when too much contradicts the pose and nothing agrees."""
         standing = track.stamp - track.moved > _STANDS_AFTER
-        judged = self._doubt.judge(track.stamp, self._last_agreed, standing)
-        if judged is None:
-            return
-        react = self._belief.lose if judged.status == "lost" else self._belief.doubt
-        react(track.stamp, judged.reason)
+        if judged := self._doubt.judge(track.stamp, self._last_agreed, standing):
+            react = self._belief.lose if judged.status == "lost" else self._belief.doubt
+            react(track.stamp, judged.reason)
 
     def _judge(self, track: Track) -> Suspected:
         misfit, moved = track.filter.map_misfit, self._health.moved

@@ -39,6 +39,8 @@ class Sighted:
 
 Sample = Odometry | PanReading | FrameFile | Sighted
 
+LONGEST_GAP = 0.5
+"""Seconds without any sample after which nobody knows how the robot has moved."""
 _FASTEST = 100.0
 """No robot on poles drives faster, m/s."""
 _SMALLEST_ROBOT, _LARGEST_ROBOT = 0.001, 100.0
@@ -67,7 +69,7 @@ class Dataset:
     settings: LocalizerSettings = field(default_factory=LocalizerSettings)
     """What its localizer tolerated; the program's own values where that was not recorded."""
     notes: tuple[str, ...] = ()
-    """What is missing, as sentences."""
+    """What is missing or left out, as sentences."""
 
     @property
     def frames(self) -> int:
@@ -95,6 +97,7 @@ def read_dataset(folder: Path) -> Dataset:
     if not minimum < maximum:
         raise DatasetError(f"{path}: camera.pan_min_rad must be less than pan_max_rad.")
     truth = folder / "truth.tum"
+    samples, notes = _samples(folder, (minimum - _BEYOND, maximum + _BEYOND))
     return Dataset(
         folder=folder,
         camera=Camera(
@@ -113,9 +116,10 @@ def read_dataset(folder: Path) -> Dataset:
         pan_minimum=minimum,
         pan_maximum=maximum,
         landmarks=_landmarks(root),
-        samples=_samples(folder, (minimum - _BEYOND, maximum + _BEYOND)),
+        samples=samples,
         truth=read_tum(truth) if truth.exists() else None,
         paint=root.child("landmark").paint(),
+        notes=notes,
     )
 
 
@@ -149,10 +153,12 @@ def _landmarks(root: Fields) -> dict[int, Landmark]:
     return marks
 
 
-def _samples(folder: Path, pan: tuple[float, float]) -> tuple[Sample, ...]:
+def _samples(folder: Path, pan: tuple[float, float]) -> tuple[tuple[Sample, ...], tuple[str, ...]]:
+    """The samples in order, and what was left out of them, as sentences."""
     path = folder / "samples.jsonl"
     samples: list[Sample] = []
-    last = -math.inf
+    last = pictured = -math.inf
+    again: list[int] = []
     # Not splitlines(): a text inside JSON may hold what Unicode calls the end of a line.
     for number, line in enumerate(_read_text(path).split("\n"), start=1):
         if not line.strip():
@@ -176,6 +182,11 @@ def _samples(folder: Path, pan: tuple[float, float]) -> tuple[Sample, ...]:
             picture = folder / fields.text("file")
             if not _is_file(picture):
                 raise DatasetError(f"{where}: there is no picture {shown(str(picture))}.")
+            if stamp == pictured:
+                # One camera takes one picture at a time; told twice, it is no second witness.
+                again.append(number)
+                continue
+            pictured = stamp
             samples.append(FrameFile(stamp, picture, number))
         else:
             raise DatasetError(f"{where}: kind is {kind!r}: expected 'drive', 'pan' or 'frame'.")
@@ -184,7 +195,13 @@ def _samples(folder: Path, pan: tuple[float, float]) -> tuple[Sample, ...]:
     for wanted, name in ((FrameFile, "frame"), (Odometry, "drive"), (PanReading, "pan")):
         if not any(isinstance(sample, wanted) for sample in samples):
             raise DatasetError(f"{path}: expected at least one sample of kind {name!r}.")
-    return in_order(samples)
+    notes = []
+    if again:
+        notes.append(
+            f"samples.jsonl:{again[0]}: a picture of the same moment as the one before; "
+            f"{len(again)} of this kind left out."
+        )
+    return in_order(samples), tuple(notes)
 
 
 def _is_file(path: Path) -> bool:

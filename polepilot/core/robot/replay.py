@@ -25,15 +25,13 @@ from polepilot.core.observation import (
     RangeBearing,
     Status,
 )
-from polepilot.core.robot.dataset import Dataset, FrameFile, Sighted
+from polepilot.core.robot.dataset import LONGEST_GAP, Dataset, FrameFile, Sighted
 from polepilot.core.robot.smoother import Picture, Smoother
 from polepilot.core.trajectory import format_tum
 
 See = Callable[[FrameFile], Sequence[Detection]]
 """Reads the landmarks of a picture. Raises ImageError where it is none."""
 
-_CLOCK_JUMP = 0.5
-"""Seconds without any sample after which nobody knows how the robot has moved."""
 _AT_REST = 5.0
 """Seconds after which motors and servo have done what they were told, whatever their lags."""
 _SEARCH = 10.0
@@ -151,7 +149,7 @@ def replay(
     command = Odometry(last, 0.0, 0.0)
     for sample in dataset.samples:
         stamp = sample.stamp
-        if stamp - last > _CLOCK_JUMP:
+        if stamp - last > LONGEST_GAP:
             text = f"Nothing was recorded for {stamp - last:.1f} s: the pose is looked for anew."
             result.events.append(LocalizerEvent(stamp, "clock_jump", text))
             _forget(localizer, text)
@@ -239,7 +237,7 @@ def smooth(dataset: Dataset, result: ReplayResult) -> list[tuple[float, Pose2D]]
         jumps = [
             index
             for index, ((before, _), (after, _)) in enumerate(pairwise(pictures), start=1)
-            if after <= first and after - before > _CLOCK_JUMP
+            if after <= first and after - before > LONGEST_GAP
         ]
         pictures = pictures[jumps[-1] if jumps else 0 :]
         begun = last

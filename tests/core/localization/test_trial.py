@@ -238,7 +238,10 @@ def run(
     count: int,
     row: int = 3,
 ) -> list[tuple[Status, float, float, str]]:
-    """Stand at `POSE` and see one landmark after the other, each ``row`` times; status, error, sigma and reason."""
+    """Stand at `POSE` and see one landmark after the other, each ``row`` times in a row.
+
+    Answers status, error, sigma and reason after each picture.
+    """
     localizer = Localizer(mapped, Vehicle(), FORWARD)
     localizer.add_odometry(Odometry(0.0, 0.0, 0.0))
     rows = []

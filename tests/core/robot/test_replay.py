@@ -200,6 +200,19 @@ def test_an_unreadable_picture_is_left_out_and_said(tmp_path: Path) -> None:
     assert result.to_json()["first_pose_t"] is None
 
 
+def test_a_picture_that_is_told_twice_is_one_witness(tmp_path: Path) -> None:
+    later = [{**line, "t": 0.2} for line in GOOD[1:]]
+    once = read_dataset(write(tmp_path / "once", lines=[*GOOD, *later]))
+    twice = read_dataset(
+        write(tmp_path / "twice", lines=[*GOOD, GOOD[2], GOOD[2], *later, GOOD[2] | later[1]])
+    )
+    assert once.notes == ()
+    assert twice.notes == (
+        "samples.jsonl:4: a picture of the same moment as the one before; 3 of this kind left out.",
+    )
+    assert [s.stamp for s in twice.samples] == [s.stamp for s in once.samples]
+
+
 def test_a_clock_that_jumps_gives_up_the_pose(tmp_path: Path) -> None:
     recorded = Recorded(tmp_path / "run", record(33, 35.0))
     path = tmp_path / "run" / "samples.jsonl"

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 Kinds = dict[int, "LandmarkKind"]
 
-_GAP = 2.0
-"""Seconds without any sample after which nobody knows how the robot has moved."""
 _MARGIN = 0.5
 """The outline of a site that has none yet keeps so far off poles and path, metres."""
 _NEAR = 0.12
@@ -105,7 +103,7 @@ def survey(
         )
     kinds, default = _kinds(recording, data, site, ids)
     with _bar() as tell:
-        run = to_run(data, kinds, lambda share: tell("reading pictures", share))
+        run, left_out = to_run(data, kinds, lambda share: tell("reading pictures", share))
         try:
             found = build(run, options, tell)
         except InputError as error:
@@ -132,10 +130,10 @@ def survey(
             "sightings": run.sightings(),
             "travelled": run.travelled(),
         }
-        notes = [*data.notes, *found.notes]
+        notes = [*data.notes, *left_out, *found.notes]
         typer.echo(json.dumps({**found.to_json(), "notes": notes, **extra}, allow_nan=False))
     else:
-        typer.echo("\n".join([*_summary(found, run), *data.notes]))
+        typer.echo("\n".join([*_summary(found, run), *data.notes, *left_out]))
 
 
 def read_recording(path: Path) -> Dataset:
@@ -151,8 +149,10 @@ def read_recording(path: Path) -> Dataset:
     return read_dataset(path) if log is None else read_run_log(log)
 
 
-def to_run(data: Dataset, kinds: Kinds, progress: Callable[[float], None]) -> SurveyRun:
-    """What was driven and seen; pictures are read here.
+def to_run(
+    data: Dataset, kinds: Kinds, progress: Callable[[float], None]
+) -> tuple[SurveyRun, list[str]]:
+    """What was driven and seen, and which pictures told nothing; pictures are read here.
 
     Raises:
         DatasetError: none of the pictures can be used.
@@ -162,7 +162,7 @@ def to_run(data: Dataset, kinds: Kinds, progress: Callable[[float], None]) -> Su
     from polepilot.core.errors import DatasetError, ImageError
     from polepilot.core.localization.survey_run import SurveyRun
     from polepilot.core.observation import Odometry, PanReading
-    from polepilot.core.robot.dataset import FrameFile, Sighted
+    from polepilot.core.robot.dataset import LONGEST_GAP, FrameFile, Sighted
     from polepilot.core.vision.detector import LandmarkDetector
     from polepilot.core.vision.images import read_image
     from polepilot.core.vision.measure import to_range_bearing
@@ -170,7 +170,8 @@ def to_run(data: Dataset, kinds: Kinds, progress: Callable[[float], None]) -> Su
     pan = _PanAt([s for s in data.samples if isinstance(s, PanReading)])
     detector = LandmarkDetector(data.camera, kinds, data.paint)
     pictures = []
-    problem, unusable = "", 0
+    unusable: list[str] = []
+    unpointed: list[str] = []
     for sample in data.samples:
         if isinstance(sample, Sighted):
             seen = tuple(m for m in sample.measurements if math.isfinite(m.bearing))
@@ -186,11 +187,14 @@ def to_run(data: Dataset, kinds: Kinds, progress: Callable[[float], None]) -> Su
                         f"{wanted[1]} x {wanted[0]}."
                     )
             except ImageError as error:
-                unusable += 1
-                problem = f"samples.jsonl:{sample.line}: {error.message}"
+                unusable.append(f"samples.jsonl:{sample.line}: {error.message}")
             else:
                 pointing = pan(sample.stamp)
-                if pointing is not None:
+                if pointing is None:
+                    unpointed.append(
+                        f"samples.jsonl:{sample.line}: no pan reading within {_GIVEN_UP} s."
+                    )
+                else:
                     angle, sigma = pointing
                     seen = tuple(
                         _less_sure(to_range_bearing(one, sample.stamp, angle), sigma)
@@ -198,10 +202,19 @@ def to_run(data: Dataset, kinds: Kinds, progress: Callable[[float], None]) -> Su
                     )
             pictures.append((sample.stamp, seen))
             progress(len(pictures) / data.frames)
-    if pictures and unusable == len(pictures):
+    if pictures and len(unusable) + len(unpointed) == len(pictures):
+        problem = (unusable or unpointed)[-1]
         raise DatasetError(f"{data.folder}: none of its pictures can be used; {problem}")
-    gaps = [a.stamp for a, b in pairwise(data.samples) if b.stamp - a.stamp > _GAP]
-    return SurveyRun(
+    left_out = [
+        f"Left out, as {why}: {len(those)} of {len(pictures)} pictures, the first one {those[0]}"
+        for why, those in (
+            ("they cannot be read", unusable),
+            ("nobody knows where the camera pointed", unpointed),
+        )
+        if those
+    ]
+    gaps = [a.stamp for a, b in pairwise(data.samples) if b.stamp - a.stamp > LONGEST_GAP]
+    run = SurveyRun(
         odometry=tuple(s for s in data.samples if isinstance(s, Odometry)),
         pictures=tuple(pictures),
         wheelbase=data.vehicle.wheelbase,
@@ -209,6 +222,7 @@ def to_run(data: Dataset, kinds: Kinds, progress: Callable[[float], None]) -> Su
         pan_range=max(abs(data.pan_minimum), abs(data.pan_maximum)),
         breaks=tuple(gaps),
     )
+    return run, left_out
 
 
 def site_document(

@@ -109,6 +109,12 @@ def test_pictures_become_a_map(
         assert math.dist(pose.to_parent(place), truth[number]) < 0.03
     assert document["frame"] == "first pose"
     assert document["pictures"] == 150
+    # Pan and picture alternate after the first line: the tenth picture is line 21.
+    (note,) = [note for note in document["notes"] if note.startswith("Left out")]
+    assert note.startswith(
+        "Left out, as they cannot be read: 1 of 150 pictures, the first one samples.jsonl:21: "
+    )
+    assert "009.png" in note
     assert len(document["path"]) == 150
     assert math.dist(pose.position, START.position) < 0.03
     for pole in document["poles"]:
@@ -224,6 +230,24 @@ def test_no_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert "expected a folder" in capsys.readouterr().err
     assert run(["survey", str(tmp_path)]) == 2
     assert "dataset.json" in capsys.readouterr().err
+
+
+def test_pictures_of_which_nobody_knows_where_they_look(
+    drawn: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = [json.loads(line) for line in (drawn / "samples.jsonl").read_text().splitlines()]
+    (tmp_path / "dataset.json").write_text((drawn / "dataset.json").read_text())
+    for line in lines:
+        if line["kind"] == "frame":
+            line["file"] = str(drawn / line["file"])
+    kept = [line for line in lines if line["kind"] != "pan" or line["t"] < 12.0]
+    (tmp_path / "samples.jsonl").write_text("".join(json.dumps(line) + "\n" for line in kept))
+    assert run(["survey", str(tmp_path)]) == 0
+    assert re.search(
+        r"Left out, as nobody knows where the camera pointed: 2\d of 150 pictures, the first one "
+        r"samples.jsonl:\d+: no pan reading within 0.25 s\.",
+        capsys.readouterr().out,
+    )
 
 
 def test_pictures_without_a_drive(

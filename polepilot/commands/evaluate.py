@@ -71,6 +71,8 @@ def evaluate(
     true = points.real if truth is None else read_tum(truth)
     if true is None:
         raise InputError(f"{files[0]}: its true poses are not known: give --truth TRUTH.tum.")
+    if len(true.stamps) == 0:
+        raise InputError(f"{truth or files[0]}: holds no true poses.")
     if cov is not None:
         points.covariances = read_covariances(cov)
     if target is not None:

@@ -17,7 +17,7 @@ def precision(
     site_file: Annotated[Path, typer.Argument(metavar="SITE.json", help="Site, or GeoJSON.")],
     resolution: Annotated[float | None, typer.Option(help="From spot to spot, m.")] = None,
     fine: Annotated[bool, typer.Option("--fine", help="Some 20,000 spots, not 1,200.")] = False,
-    suggest: Annotated[int, typer.Option(help="So many more landmarks: where?")] = 0,
+    suggest: Annotated[int | None, typer.Option(help="So many more landmarks: where?")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw the map: OUT.svg or OUT.png.")] = None,
     config: Annotated[Path | None, typer.Option(help="robot.toml: camera and pan unit.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
@@ -46,7 +46,7 @@ def precision(
         resolution = fine_resolution(site)
     try:
         found = precision_map(site, sweep, resolution)
-        more = suggest_places(site, suggest, sweep) if suggest else None
+        more = suggest_places(site, suggest, sweep) if suggest is not None else None
     except SiteError:
         raise
     except InputError as error:

@@ -80,11 +80,16 @@ def write_tum(
     path.write_text(format_tum(stamps, poses), encoding="ascii")
 
 
+_ROUNDED = 0.1
+"""So far from 1 a rounded quaternion's length may be."""
+
+
 def read_tum(path: Path) -> Trajectory:
     """Read a TUM file. Empty lines and lines that begin with ``#`` are skipped.
 
     Raises:
-        DatasetError: no such file, or a line that is not eight finite numbers in order of time.
+        DatasetError: no such file, or a line that is not eight finite numbers in order of time, or
+            whose last four are no rotation.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -108,6 +113,11 @@ def read_tum(path: Path) -> Trajectory:
         if rows and stamp < rows[-1][0]:
             raise DatasetError(
                 f"{path}:{number}: time {stamp} follows {rows[-1][0]}: expected rising times."
+            )
+        if abs(math.hypot(qx, qy, qz, qw) - 1.0) > _ROUNDED:
+            raise DatasetError(
+                f"{path}:{number}: {qx:g} {qy:g} {qz:g} {qw:g} is no rotation: expected a "
+                "quaternion of length 1."
             )
         heading = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
         rows.append((stamp, x, y, wrap_angle(heading)))

@@ -152,7 +152,7 @@ def test_what_is_refused(tmp_path: Path, capsys: Captured) -> None:
     assert "gone.tum" in refusal([str(tmp_path / "gone.tum"), "--truth", truth], capsys)
     assert "holds no poses" in refusal([str(empty), "--truth", truth], capsys)
     assert "shares no time" in refusal([later, "--truth", truth], capsys)
-    assert "shares no time" in refusal([good, "--truth", str(empty)], capsys)
+    assert f"{empty}: holds no true poses" in refusal([good, "--truth", str(empty)], capsys)
     assert "give --truth" in refusal([good], capsys)
     assert ".svg or .png" in refusal([good, "--truth", truth, "--plot", "a.pdf"], capsys)
     assert "one run alone" in refusal([good, str(tmp_path), "--truth", truth], capsys)

@@ -105,6 +105,7 @@ def test_a_site_without_landmarks_is_drawn() -> None:
         (["--resolution", "1", "--fine"], "--fine and --resolution"),
         (["--suggest", "21"], "--suggest"),
         (["--suggest", "-1"], "--suggest"),
+        (["--suggest", "0"], "expected 1 to 20 landmarks"),
         (["--suggest", "9"], "ids left"),
         (["--plot", "/nowhere/map.svg"], "--plot"),
         (["--config", "missing.toml"], "missing.toml"),

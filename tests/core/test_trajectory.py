@@ -72,6 +72,7 @@ def test_no_common_time_gives_zeros() -> None:
     [
         ("0 0 0 0 0 0 0 1\n1 2 3\n", ":2: expected eight"),
         ("0 nan 0 0 0 0 0 1\n", ":1: expected eight"),
+        ("0 0 0 0 0 0 0 0.99\n1 0 0 0 0 0 0 0\n", ":2: 0 0 0 0 is no rotation"),
         ("1 0 0 0 0 0 0 1\n# remark\n0 0 0 0 0 0 0 1\n", ":3: time 0.0 follows 1.0"),
     ],
 )

@@ -3,8 +3,10 @@
 Eq. 3 is misprinted: its y terms have (xa + xb)/2 where (ya + yb)/2 belongs and (yb - ya) before
 the root where (xb - xa) belongs; both are mended here (method.md has the check).
 
-Deviation: the circles give the first guess only. The pose is then the weighted least squares of
-all ranges and bearings at once, with the covariance that follows from their errors.
+Deviation: only `two_landmark_fix` begins with the circles. `fix`, which the localizer uses, lays
+every pair of landmarks, as ranges and bearings show them, over the map, and keeps the pose that
+most landmarks agree with. In both the pose is then the weighted least squares of all ranges and
+bearings at once, with the covariance that follows from their errors.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ class NoiseModel:
     range_floor: float = 0.003
     """Added to every range's error, metres: what the detector does not know of its errors."""
     bearing_floor: float = math.radians(0.10)
-    """Added to every bearing's error: quantization, and what four coefficients do not describe."""
+    """Added to every bearing's error: quantization, and what six coefficients do not describe."""
     survey_sigma: float = 0.005
     """Of a landmark's mapped position, per axis, metres."""
     position_limit: float = 0.002

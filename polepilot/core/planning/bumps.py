@@ -151,8 +151,10 @@ class _Bumped:
         """What bumps leave of some patches, each at least ``smallest`` m²."""
         swept = np.array([bump.swept for bump in self._bumps], dtype=object)
         rest = np.array(patches, dtype=object)
-        for patch, bump in shapely.STRtree(swept).query(rest, predicate="intersects").T.tolist():
-            rest[patch] = rest[patch].difference(swept[bump])
+        of, bumps = shapely.STRtree(swept).query(rest, predicate="intersects")
+        for patch in np.unique(of).tolist():
+            # All at once: a long patch would be cut anew, in whole, for every one of them.
+            rest[patch] = rest[patch].difference(shapely.union_all(swept[bumps[of == patch]]))
         return patches_of(rest, smallest)
 
     def _step_aside(self, piece: Polygon) -> bool:

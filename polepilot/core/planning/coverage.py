@@ -101,9 +101,11 @@ def plan_scan(
     pieces, swept = [space.polygon], wanted
     if options.min_turn_radius > 0:
         pieces, swept = wheel_outlines(site, space, wanted, options.tool_width)
+    notes = [*site.repairs, *space.notes]
+    if options.tool_width / 2 < space.clearance:
+        swept = _within_reach(wanted, swept, space, options, notes)
     target = Target(swept, options.tool_width)
     report(0.1, "loops")
-    notes = [*site.repairs, *space.notes]
     path, gear, parts = _shortest(pieces, space, options, target, area is None, notes, report)
     report(0.8, "unreachable parts")
     missing = unreachable_pieces(space, reachable)
@@ -128,6 +130,26 @@ def plan_scan(
         notes=tuple(notes),
         runtime=time.perf_counter() - began,
     )
+
+
+def _within_reach(
+    wanted: MultiPolygon,
+    swept: MultiPolygon,
+    space: FreeSpace,
+    options: PlanOptions,
+    notes: list[str],
+) -> MultiPolygon:
+    """What of ``swept`` a tool gets to that is narrower than the robot keeps away from walls; a
+    note says how much of ``wanted`` it does not."""
+    reach = space.polygon.buffer(options.tool_width / 2, quad_segs=16)
+    rim = wanted.difference(reach).area
+    if rim >= 0.01:
+        notes.append(
+            f"{rim:.2f} m² along walls is out of the tool's reach: it is "
+            f"{in_words(options.tool_width)} wide, and the robot keeps "
+            f"{in_words(space.clearance)} away."
+        )
+    return as_multi(swept.intersection(reach))
 
 
 def _shortest(

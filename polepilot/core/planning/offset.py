@@ -26,7 +26,8 @@ _FINE = 0.005
 _SLIVER = 0.004
 """What is thinner than twice this gets no pass, m."""
 _THIN = 0.1
-"""A piece thinner than this share of the tool width is driven once, not around."""
+"""What loops leave in a piece is driven once, not around, if it is thinner than this share of the
+tool width. A piece that is thin as a whole has an outline all the same: cutting it up costs more."""
 
 
 @dataclass(slots=True, eq=False)
@@ -79,7 +80,7 @@ def nested_loops(
         while level:
             following: list[Polygon] = []
             for polygon in level:
-                if not polygon.buffer(-_THIN * tool_width / 2).is_empty:
+                if depth == 0 or not polygon.buffer(-_THIN * tool_width / 2).is_empty:
                     loops += _rings(polygon, depth, tolerance)
                     inner = polygon.buffer(-step, quad_segs=quadrant(step, 0.0005), **joins)
                     following += [

@@ -70,6 +70,8 @@ def sharp_path(
         return _with_bumps(path, parts, space, options, target)
     # The longest strip that loops leave is driven once, and nothing leads back from there.
     passes = cleanup_strokes(strip, tool, space, smallest)
+    if not passes:
+        return _with_bumps(path, parts, space, options, target)
     end = (float(path[-1, 0]), float(path[-1, 1]))
     longer = _joined_runs(chained(passes, end), space, options, [], path, parts)
     longer = trimmed(*longer, target, 3 * smallest)

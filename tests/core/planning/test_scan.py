@@ -203,3 +203,28 @@ def test_the_clearance_is_kept_as_written(radius: float) -> None:
     site = maps.pillars(9, seed=5)
     document = plan_scan(site, PlanOptions(min_turn_radius=radius)).to_json()
     assert site.obstacles().distance(LineString(document["path"])) >= 0.2
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.36])
+@pytest.mark.parametrize("tool", [0.1, 0.3, 0.39])
+def test_a_tool_narrower_than_what_the_robot_keeps_away(tool: float, radius: float) -> None:
+    """What it cannot get to along walls is said, and nothing is tried for it."""
+    site = Site(boundary=((0, 0), (3, 0), (3, 2), (0, 2)), start=Start(1, 1, 0.0))
+    options = PlanOptions(tool_width=tool, clearance=0.2, min_turn_radius=radius)
+    plan = plan_scan(site, options)
+    check(plan, site, radius)
+    inner = Polygon([(0.2, 0.2), (2.8, 0.2), (2.8, 1.8), (0.2, 1.8)]).buffer(tool / 2)
+    assert any("out of the tool's reach" in note for note in plan.notes)
+    assert not any("turning radius" in note for note in plan.notes)
+    assert plan.predicted.coverage >= inner.area / plan.area.area - 0.01
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.6])
+@pytest.mark.parametrize("width", [0.403, 0.41, 0.42, 0.43, 0.44])
+def test_a_corridor_hardly_wider_than_the_robot(width: float, radius: float) -> None:
+    site = Site(boundary=((0, 0), (6, 0), (6, width), (0, width)), start=Start(1, width / 2, 0.0))
+    options = PlanOptions(tool_width=0.4, clearance=0.2, min_turn_radius=radius)
+    plan = plan_scan(site, options)
+    check(plan, site, radius)
+    assert plan.predicted.coverage >= 0.995
+    assert plan.predicted.length <= 1.3 * (6 - 0.4) * 2

@@ -27,7 +27,7 @@ _SLIVER = 0.004
 """What is thinner than twice this gets no pass, m."""
 _THIN = 0.1
 """What loops leave in a piece is driven once, not around, if it is thinner than this share of the
-tool width. A piece that is thin as a whole has an outline all the same: cutting it up costs more."""
+tool width. A piece that is thin as a whole has an outline all the same: that is shorter."""
 
 
 @dataclass(slots=True, eq=False)

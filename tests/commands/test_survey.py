@@ -6,6 +6,7 @@ import json
 import math
 import re
 import xml.etree.ElementTree as ET
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -232,16 +233,22 @@ def test_no_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert "dataset.json" in capsys.readouterr().err
 
 
-def test_pictures_of_which_nobody_knows_where_they_look(
-    drawn: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def copied(drawn: Path, to: Path, kept: Callable[[dict[str, Any]], bool]) -> list[dict[str, Any]]:
+    """All lines of the recording, of which some are written to a folder; its pictures stay."""
     lines = [json.loads(line) for line in (drawn / "samples.jsonl").read_text().splitlines()]
-    (tmp_path / "dataset.json").write_text((drawn / "dataset.json").read_text())
+    (to / "dataset.json").write_text((drawn / "dataset.json").read_text())
     for line in lines:
         if line["kind"] == "frame":
             line["file"] = str(drawn / line["file"])
-    kept = [line for line in lines if line["kind"] != "pan" or line["t"] < 12.0]
-    (tmp_path / "samples.jsonl").write_text("".join(json.dumps(line) + "\n" for line in kept))
+    text = "".join(json.dumps(line) + "\n" for line in lines if kept(line))
+    (to / "samples.jsonl").write_text(text)
+    return lines
+
+
+def test_pictures_of_which_nobody_knows_where_they_look(
+    drawn: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copied(drawn, tmp_path, lambda line: line["kind"] != "pan" or line["t"] < 12.0)
     assert run(["survey", str(tmp_path)]) == 0
     assert re.search(
         r"Left out, as nobody knows where the camera pointed: 2\d of 150 pictures, the first one "
@@ -253,13 +260,7 @@ def test_pictures_of_which_nobody_knows_where_they_look(
 def test_pictures_without_a_drive(
     drawn: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    lines = [json.loads(line) for line in (drawn / "samples.jsonl").read_text().splitlines()]
-    (tmp_path / "dataset.json").write_text((drawn / "dataset.json").read_text())
-    for line in lines:
-        if line["kind"] == "frame":
-            line["file"] = str(drawn / line["file"])
-    kept = [line for line in lines if line["kind"] != "drive"]
-    (tmp_path / "samples.jsonl").write_text("".join(json.dumps(line) + "\n" for line in kept))
+    lines = copied(drawn, tmp_path, lambda line: line["kind"] != "drive")
     assert run(["survey", str(tmp_path)]) == 2
     assert "expected at least one sample of kind 'drive'" in capsys.readouterr().err
     kept = [line | ({"speed": 0.0} if line["kind"] == "drive" else {}) for line in lines]

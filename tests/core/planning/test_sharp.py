@@ -11,8 +11,9 @@ import shapely
 from core.planning import maps
 from shapely import MultiPolygon
 
+from polepilot.core.plan import PartKind
 from polepilot.core.planning.offset import Stroke, nested_loops
-from polepilot.core.planning.options import PlanOptions
+from polepilot.core.planning.options import Order, PlanOptions
 from polepilot.core.planning.order import ordered_runs
 from polepilot.core.planning.sharp import Recorder, chained, path_cost, path_length, sharp_path
 from polepilot.core.planning.space import FreeSpace, as_multi, free_space
@@ -23,8 +24,8 @@ TOOL = 0.4
 OPTIONS = PlanOptions(min_turn_radius=0, start=Start(0.5, 0.5))
 
 
-def _planned(space: FreeSpace, order: str = "default") -> tuple[np.ndarray, tuple, Target]:
-    options = PlanOptions(min_turn_radius=0, start=OPTIONS.start, order=order)  # type: ignore[arg-type]
+def _planned(space: FreeSpace, order: Order = "default") -> tuple[np.ndarray, tuple, Target]:
+    options = PlanOptions(min_turn_radius=0, start=OPTIONS.start, order=order)
     target = Target(as_multi(space.reachable().intersection(space.floor)), TOOL)
     strokes = nested_loops([space.polygon], TOOL, 0.002, overlap=0.004)
     runs = ordered_runs(strokes, (0.5, 0.5), space, options.order, TOOL, 0.22)
@@ -73,8 +74,9 @@ def test_a_chain_of_passes_takes_the_nearest_end_next() -> None:
 
 def test_parts_follow_each_other() -> None:
     recorder = Recorder()
-    for kind, last in (("link", 2), ("loop", 5), ("loop", 9), ("cleanup", 9), ("cleanup", 11)):
-        recorder.close(kind, last)  # type: ignore[arg-type]
+    runs: list[tuple[PartKind, int]] = [("link", 2), ("loop", 5), ("loop", 9)]
+    for kind, last in (*runs, ("cleanup", 9), ("cleanup", 11)):
+        recorder.close(kind, last)
     recorder.close("cleanup", 12)
     found = [(part.kind, part.first, part.last) for part in recorder.parts]
     assert found == [("link", 0, 2), ("loop", 2, 5), ("loop", 5, 9), ("cleanup", 9, 12)]

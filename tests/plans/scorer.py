@@ -108,11 +108,18 @@ def ground(site: Document, start: tuple[float, float], clearance: float) -> Grou
         )
     pieces = [part for part in shapely.get_parts(free).tolist() if part.area > 1e-7]
     home = min(pieces, key=lambda part: part.distance(shapely.Point(start)))
-    reachable = home.buffer(clearance, quad_segs=_ROUND)
-    if not reachable.is_valid:
-        reachable = shapely.make_valid(reachable)
+    reachable = _around(home, clearance)
     walls = shapely.union_all([shapely.boundary(floor), *lines])
     return Ground(floor, walls, home, reachable.intersection(floor))
+
+
+def _around(home: Polygon, radius: float) -> shapely.Geometry:
+    """What a disc takes up whose middle goes everywhere in ``home``: one capsule per side, united.
+
+    A buffer of all at once may fill what lies between two walls.
+    """
+    sides = [edge for rim in shapely.get_parts(home.boundary) for edge in _segments(rim)]
+    return shapely.union_all([home, *shapely.buffer(sides, radius, quad_segs=_ROUND)])
 
 
 def judge(

@@ -12,8 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from polepilot.core.errors import InternalError
+
+_SHARP = 0.35
+"""Outlines are cut where they turn by more than this, radians."""
+_MOST_TURN = 1.4
+"""And so that no piece turns by more than this, radians."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,11 +62,23 @@ class Footprint:
 
     def ground(self, places: shapely.Geometry) -> shapely.Geometry:
         """What it takes up of the floor while `base_link` goes everywhere in ``places``."""
-        ground = places.buffer(self.radius, quad_segs=self.quadrant)
-        if ground.is_valid:
-            return ground
-        # Where arcs nearly touch each other GEOS may let them cross, and fill what lies between.
-        rims = [shapely.get_coordinates(rim) for rim in shapely.get_parts(places.boundary)]
-        sides = np.concatenate([np.stack([rim[:-1], rim[1:]], axis=1) for rim in rims])
-        discs = shapely.buffer(shapely.linestrings(sides), self.radius, quad_segs=self.quadrant)
-        return shapely.union_all([places, *discs])
+        # Of whole outlines GEOS may fill what lies between two stretches that nearly touch; it does
+        # not of short ones that hardly bend, and does not when they are united.
+        rims = [_short_bends(rim) for rim in shapely.get_parts(shapely.boundary(places))]
+        around = shapely.buffer(np.concatenate(rims), self.radius, quad_segs=self.quadrant)
+        return shapely.union_all([places, *around])
+
+
+def _short_bends(rim: shapely.LineString) -> NDArray[np.object_]:
+    """A line in pieces without sharp corners, each of which turns by little in all."""
+    points = shapely.get_coordinates(rim)
+    steps = np.diff(points, axis=0)
+    turns = np.diff(np.arctan2(steps[:, 1], steps[:, 0]))
+    turns = np.abs((turns + math.pi) % math.tau - math.pi)
+    sharp = turns > _SHARP
+    piece = np.floor(np.cumsum(np.where(sharp, 0.0, turns)) / _MOST_TURN) + np.cumsum(sharp)
+    cuts = np.r_[0, np.flatnonzero(np.diff(np.r_[0.0, piece])) + 1, len(points) - 1]
+    sizes = np.diff(cuts) + 1
+    rows = np.repeat(np.arange(len(sizes)), sizes)
+    places = np.arange(len(rows)) - rows  # each piece begins with the last point of the one before
+    return np.asarray(shapely.linestrings(points[places], indices=rows))

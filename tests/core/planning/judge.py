@@ -35,7 +35,9 @@ def reachable(site: Site, start: tuple[float, float], clearance: float) -> shape
         free = free.difference(walls.buffer(clearance, quad_segs=32))
     parts = list(getattr(free, "geoms", [free]))
     home = min(parts, key=lambda part: part.distance(shapely.Point(start)))
-    return home.buffer(clearance, quad_segs=32)
+    rims = [shapely.get_coordinates(rim) for rim in shapely.get_parts(home.boundary)]
+    sides = [LineString(pair) for rim in rims for pair in np.stack([rim[:-1], rim[1:]], axis=1)]
+    return shapely.union_all([home, *shapely.buffer(sides, clearance, quad_segs=32)])
 
 
 def coverage(plan: Plan, site: Site) -> float:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
+from plans.scorer import ground
+from plans.shapes import fences
 from shapely import LineString, Point, box
 
 from polepilot.core.errors import InternalError
 from polepilot.core.planning.footprint import Footprint
+from polepilot.core.planning.space import footprint, polygons
 
 DISC = Footprint(0.25, 1e-4)
 
@@ -30,6 +34,24 @@ def test_the_ground_of_a_room_lacks_only_its_corners() -> None:
     ground = DISC.ground(DISC.places(room))
     assert room.buffer(1e-9).covers(ground)
     assert room.area - ground.area == pytest.approx((4 - math.pi) * 0.25**2, abs=1e-3)
+
+
+@pytest.mark.parametrize("seed", [2012, 2022, 2039, 2055, 2092])
+def test_the_ground_between_fences_is_what_the_disc_gets_to(seed: int) -> None:
+    """Of whole outlines like these buffers are valid and fill what lies between two fences."""
+    site = fences((6, 5), 14, seed)
+    lines = [LineString(wall) for wall in site["walls"]]
+    disc = footprint(0.2)
+    places = max(polygons(disc.places(box(0, 0, 6, 5), lines)), key=lambda piece: piece.area)
+    start = places.representative_point()
+    spots = np.stack(np.meshgrid(np.arange(0.01, 6, 0.02), np.arange(0.01, 5, 0.02)), axis=-1)
+    spots = spots.reshape(-1, 2)
+    away = shapely.distance(places, shapely.points(spots))
+    for found in (disc.ground(places), ground(site, (start.x, start.y), 0.2).reachable):
+        inside = shapely.intersects_xy(found, *spots.T)
+        assert away[inside].max() < 0.202  # the planner keeps 0.15 mm more
+        assert away[~inside].min() > 0.1999
+        assert found.area == pytest.approx(0.02**2 * np.count_nonzero(away < 0.2), abs=0.03)
 
 
 @given(st.floats(0.01, 50.0), st.floats(1e-5, 0.01))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from polepilot.core.errors import PlanError
 from polepilot.core.geometry import Pose2D, wrap_angle
 from polepilot.core.plan import PlanPart
+from polepilot.core.planning.crumbs import without_crumbs
 from polepilot.core.planning.driver import Driver
 from polepilot.core.planning.offset import Points, cleanup_strokes
 from polepilot.core.planning.options import PlanOptions
@@ -84,7 +85,8 @@ def driven_path(
             f"{in_words(options.min_turn_radius)}."
         )
     path, gear, moved = without_jerks(path, gear)
-    return path, gear, _moved_parts(parts, moved)
+    path, gear, there = without_crumbs(path, gear, space)
+    return path, gear, _moved_parts(parts, there[moved])
 
 
 def _visited(

@@ -27,6 +27,8 @@ _SHORTEST = 0.01
 _LONGEST = 0.2
 """A step counts no longer than this: two long legs make a corner, not a wide curve, m.
 At a change of gear half of it, as the robot stands there."""
+_CHORD = 0.15
+"""Or no longer than this share of the turning radius: wide curves are written with long chords."""
 _PLAY = 0.02
 """Turns below this come from the digits, rad."""
 _SMALLEST = 0.05
@@ -226,7 +228,7 @@ def corners_of(path: Array, gear: NDArray[np.int_], radius: float) -> tuple[int,
     headings = np.arctan2(moves[:, 1] * gear, moves[:, 0] * gear)
     turns = np.abs((np.diff(headings) + math.pi) % math.tau - math.pi)
     changes = np.diff(gear) != 0
-    longest = np.where(changes, _LONGEST / 2, _LONGEST)
+    longest = max(_LONGEST, _CHORD * radius) * np.where(changes, 0.5, 1.0)
     mean = (np.minimum(lengths[:-1], longest) + np.minimum(lengths[1:], longest)) / 2
     asked = mean / np.maximum(turns - _PLAY, 1e-12)
     sharp = asked < 0.98 * radius

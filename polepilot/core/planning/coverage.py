@@ -31,13 +31,15 @@ from polepilot.core.planning.patches import patches_of
 from polepilot.core.planning.score import predict
 from polepilot.core.planning.sharp import path_cost, sharp_path
 from polepilot.core.planning.space import (
+    MARGIN,
     FreeSpace,
     as_multi,
     free_space,
     other_starts,
+    polygons,
 )
 from polepilot.core.planning.swept import few_corners, swept_shape
-from polepilot.core.planning.target import Target
+from polepilot.core.planning.target import CHORD, Target
 from polepilot.core.planning.unreachable import unreachable_pieces
 from polepilot.core.planning.wording import in_words
 from polepilot.core.site import Site
@@ -56,16 +58,23 @@ _FEW = 250
 """Up to so many corners other starts are tried as well, where the site has none."""
 _TOUCH = 0.004
 """How much loops overlap where bumps sweep what is left between them."""
+_AT_WALLS = 0.005
+"""How much a tool that is wider than the robot overlaps walls, as a share of its width."""
 _GAP = 0.55
 """Tool widths between the two crossings from a loop to another and back."""
 _LONG = 3.0
 """Only missed patches longer than so many tool widths get a pass of their own for a wheel; the
 others are visited from the path."""
+_BROAD = 0.36
+"""Bumps do not sweep patches that are broader than twice this share of the tool's width."""
 _RAGGED = 0.1
 """How exactly the outlines of patches are followed, in tool widths."""
 _MANY = 60
 _LARGE = 5000.0
 """Up to so many squares of the tool several spacings are tried."""
+_SMALL = 100.0
+_FINE = 0.0001
+"""Up to so many squares of the tool the prediction takes arcs as exactly as this, metres."""
 _SMALLEST = 0.008
 """Missed patches below this are left, m² for a tool of 0.4 m; scaled with its square."""
 
@@ -101,6 +110,7 @@ def plan_scan(
     pieces, swept = [space.polygon], wanted
     if options.min_turn_radius > 0:
         pieces, swept = wheel_outlines(site, space, wanted, options.tool_width)
+    pieces = _off_walls(pieces, space, options.tool_width)
     notes = [*site.repairs, *space.notes]
     if options.tool_width / 2 < space.clearance:
         swept = _within_reach(wanted, swept, space, options, notes)
@@ -110,8 +120,10 @@ def plan_scan(
     report(0.8, "unreachable parts")
     missing = unreachable_pieces(space, reachable)
     report(0.9, "prediction")
-    everything = target if swept is wanted else Target(wanted, options.tool_width)
-    left = everything.missed_area(path)
+    small = wanted.area < _SMALL * options.tool_width**2
+    if small or swept is not wanted:
+        target = Target(wanted, options.tool_width, _FINE if small else CHORD)
+    left = target.missed_area(path)
     # All that a path sweeps is reachable; with patches it sweeps other floor as well.
     under = wanted.area - left if area is None else swept_shape(path, options.tool_width).area
     predicted = predict(path, gear, options, 1.0 - left / wanted.area, under)
@@ -130,6 +142,16 @@ def plan_scan(
         notes=tuple(notes),
         runtime=time.perf_counter() - began,
     )
+
+
+def _off_walls(pieces: list[Polygon], space: FreeSpace, tool: float) -> list[Polygon]:
+    """Where the outermost loops of a tool go that reaches farther than the robot has to stay away
+    from walls: so far inside of ``pieces`` that it gets to the walls from there."""
+    depth = tool / 2 - space.clearance - MARGIN - _AT_WALLS * tool
+    if depth <= 0:
+        return pieces
+    inner = shapely.buffer(pieces, -depth, join_style="mitre", mitre_limit=2.0)
+    return [part for part in polygons(inner) if part.area > 1e-4] or pieces
 
 
 def _within_reach(
@@ -241,11 +263,12 @@ def _strokes(
         return _completed(loops, space, target, smallest, _always if plain else _long)
     if options.order == "paper":
         pieces = [region for piece in pieces for region in regions_of(piece, tool)]
+    passed = (_broad if tool / 2 > space.clearance + MARGIN else long_for_bumps) if plain else _long
     best: list[Stroke] = []
     least = math.inf
     for closer in spacings:
         loops = nested_loops(pieces, tool, tolerance, closer, _TOUCH if plain else OVERLAP)
-        strokes = _completed(loops, space, target, smallest, long_for_bumps if plain else _long)
+        strokes = _completed(loops, space, target, smallest, passed)
         # Each clean-up pass has to be gone to and left again.
         extra = 2 * tool * (1 + (options.min_turn_radius > 0))
         cost = sum(s.line.length + (0.0 if s.closed else extra) for s in strokes)
@@ -284,6 +307,14 @@ def _always(patch: Polygon, tool: float) -> bool:
     """Every patch gets a pass."""
     del patch, tool
     return True
+
+
+def _broad(patch: Polygon, tool: float) -> bool:
+    """The same as ``long_for_bumps``, or whether it is a passage narrower than the tool, in which
+    there is no loop for bumps."""
+    if long_for_bumps(patch, tool):
+        return True
+    return not patch.buffer(-_BROAD * tool, quad_segs=2).is_empty
 
 
 def _long(patch: Polygon, tool: float) -> bool:

@@ -15,6 +15,7 @@ from shapely import LineString, Polygon
 from polepilot.core.errors import PlanError
 from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.plan import Plan, PlanPart
+from polepilot.core.planning.crumbs import without_crumbs
 from polepilot.core.planning.driver import Driver
 from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.score import predict
@@ -233,7 +234,8 @@ def _driven(
                 f"On the way to node {index + 1} the robot changes its gear {times}: its turning "
                 f"radius of {in_words(options.min_turn_radius)} asks for it."
             )
-    return driver.track.arrays()
+    path, gears, _ = without_crumbs(*driver.track.arrays(), space)
+    return path, gears
 
 
 def _impossible(wanted: _Wanted, index: int, options: PlanOptions) -> PlanError:

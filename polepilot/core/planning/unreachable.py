@@ -18,6 +18,10 @@ _CRUMB = 0.01
 """What a thin wall cuts off is left out if it is smaller than this share of the whole."""
 _SLIVER = 0.0006
 _GRID = 1e-4
+_HALVINGS = 9
+"""How often the span in which the width of a passage lies is halved."""
+_PLAY = 0.001
+"""Passages that are narrower than the robot by less than this are as wide as the robot, m."""
 _MOST_REASONS = 25
 """The largest pieces are looked into one by one; a map with more has other problems."""
 
@@ -70,20 +74,20 @@ class _Passages:
             circle = shapely.maximum_inscribed_circle(piece, tolerance=0.01)
             width = 2 * float(circle.length)
             if width < needed:
-                return f"only {_less(width, needed)} wide; {need}"
-            return f"too narrow to get in; {need}"
+                return _compared("only {} wide", width, needed)
+            return f"too narrow to get in; {need} and a little play"
         target = max(inner, key=lambda p: float(p.area)).representative_point()
         home = self._space.polygon.representative_point()
         low, high = 0.004, self._space.clearance
         if not self._joined(low, target, home):
             return "enclosed: no opening leads there"
-        for _ in range(7):
+        for _ in range(_HALVINGS):
             middle = round((low + high) / 2, 4)
             if self._joined(middle, target, home):
                 low = middle
             else:
                 high = middle
-        return f"behind a passage of {_less(2 * low, needed)}; {need}"
+        return _compared("behind a passage of {}", 2 * low, needed)
 
     def _joined(self, clearance: float, a: shapely.Point, b: shapely.Point) -> bool:
         """Whether a robot of that clearance gets from ``a`` to ``b``."""
@@ -95,9 +99,13 @@ class _Passages:
         return any(part.intersects(a) and part.intersects(b) for part in self._levels[clearance])
 
 
-def _less(width: float, needed: float) -> str:
-    """A width in words that does not seem enough where it is not."""
-    return in_words(min(round(width, 2), needed - 0.001))
+def _compared(what: str, width: float, needed: float) -> str:
+    """What has a width that is not enough, and which one is needed, in words that differ."""
+    need = f"the robot needs {in_words(needed)}"
+    if needed - width < _PLAY:
+        return f"{what.format(in_words(needed))}; {need} and a little play"
+    shown = in_words(round(width, 2 if needed - width > 0.01 else 3))
+    return f"{what.format(shown)}; {need}"
 
 
 def _without_holes(piece: Polygon) -> list[Polygon]:

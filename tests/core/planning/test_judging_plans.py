@@ -71,6 +71,15 @@ def test_arcs_of_the_radius_pass_and_tighter_ones_do_not(count: int) -> None:
     assert corners_of(_arc(0.45, 1.5, count), forward, 0.6)[0] > 0
 
 
+@pytest.mark.parametrize("radius", [0.6, 1.5, 3.0, 6.0])
+def test_wide_curves_pass_with_chords_of_five_degrees(radius: float) -> None:
+    forward = np.ones(19, int)
+    assert corners_of(_arc(1.02 * radius, 1.5, 18), forward, radius)[0] == 0
+    assert corners_of(_arc(0.75 * radius, 1.5, 18), forward, radius)[0] > 0
+    corner = np.array([[0, 0], [20, 0], [40, 8]], float)
+    assert corners_of(corner, np.array([1, 1]), radius)[0] == 1
+
+
 def test_corners_between_long_legs_count_and_changes_of_gear_do_not() -> None:
     corner = np.array([[0, 0], [5, 0], [5, 5]], float)
     assert corners_of(corner, np.array([1, 1]), 0.6)[0] == 1

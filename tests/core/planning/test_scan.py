@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from core.planning import judge, maps
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely import LineString, MultiPolygon, Point, Polygon
+from shapely import LineString, MultiPolygon, Point, Polygon, box
 
 from polepilot.core.errors import PlanError, SiteError
 from polepilot.core.plan import Plan
@@ -217,6 +219,33 @@ def test_a_tool_narrower_than_what_the_robot_keeps_away(tool: float, radius: flo
     assert any("out of the tool's reach" in note for note in plan.notes)
     assert not any("turning radius" in note for note in plan.notes)
     assert plan.predicted.coverage >= inner.area / plan.area.area - 0.01
+
+
+@pytest.mark.parametrize(("tool", "clearance"), [(0.6, 0.2), (0.5, 0.2), (0.4, 0.1)])
+def test_a_tool_wider_than_what_the_robot_keeps_away(tool: float, clearance: float) -> None:
+    """Its outermost loop is half a tool from the walls, which is shorter than one nearer to them;
+    where the robot gets through, but only a narrower tool, it goes all the same."""
+    room = maps.site(maps.box(0, 0, 4, 3))
+    options = PlanOptions(tool_width=tool, clearance=clearance, min_turn_radius=0)
+    plan = plan_scan(room, options)
+    check(plan, room, 0.0)
+    assert judge.coverage(plan, room) >= 0.999
+    assert plan.predicted.length <= 1.13 * plan.area.area / tool
+    width = 1.8 * max(clearance, tool / 3)
+    rooms = shapely.union_all([box(0, 0, 3, 3), box(2.9, 1, 6.1, 1 + width), box(6, 0, 9, 3)])
+    site = Site(boundary=tuple(rooms.exterior.coords[:-1]))
+    plan = plan_scan(site, replace(options, clearance=min(clearance, 0.45 * width)))
+    check(plan, site, 0.0)
+    assert judge.coverage(plan, site) >= 0.995
+
+
+@pytest.mark.parametrize("side", [0.41, 0.45, 0.5, 0.8])
+def test_the_coverage_of_a_closet_is_as_predicted(side: float) -> None:
+    site = maps.site(maps.box(0, 0, side, side))
+    plan = plan_scan(site, PlanOptions(tool_width=0.4, clearance=0.2, min_turn_radius=0))
+    check(plan, site, 0.0)
+    assert judge.coverage(plan, site) >= 0.995
+    assert plan.predicted.coverage == pytest.approx(judge.coverage(plan, site), abs=0.0015)
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.6])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 from plans.scorer import agreement, ground
-from plans.shapes import fences
+from plans.shapes import fences, from_polygon
 from shapely import Polygon
 
 from polepilot.core.planning.options import PlanOptions
@@ -54,3 +54,23 @@ def test_ground_is_nowhere_farther_from_the_free_space_than_the_disc() -> None:
     distances = shapely.distance(space.polygon, points)
     assert distances[inside].max() < space.clearance + 0.001
     assert distances[~inside].min() > space.clearance - 0.001
+
+
+@pytest.mark.parametrize(
+    ("width", "said"),
+    [
+        (0.38, "behind a passage of 38 cm; the robot needs 40 cm"),
+        (0.395, "behind a passage of 39.5 cm; the robot needs 40 cm"),
+        (0.4001, "behind a passage of 40 cm; the robot needs 40 cm and a little play"),
+        (0.41, None),
+    ],
+)
+def test_the_width_of_a_passage_is_told_apart_from_what_is_needed(
+    width: float, said: str | None
+) -> None:
+    rooms = shapely.union_all(
+        [shapely.box(0, 0, 2, 2), shapely.box(2, 1, 3, 1 + width), shapely.box(3, 0, 5, 1.9)]
+    )
+    space = free_space(parse_site(from_polygon(rooms), "rooms"), PlanOptions(min_turn_radius=0))
+    reasons = [p.reason for p in unreachable_pieces(space, space.reachable())]
+    assert reasons == ([said] if said else [])

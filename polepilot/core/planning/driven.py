@@ -34,6 +34,8 @@ _CRUMB = SMALLEST_PATCH / 0.4**2
 """Nor those smaller than this where only a rest is to be swept."""
 _ENOUGH = 0.0003
 """Where less than this share of all is missed, no further patch is visited."""
+_SAID = 0.005
+"""Less than this is not worth a note, m²."""
 _WORTH = 0.1
 """Missed patches larger than this share of the tool's square are driven to from the end."""
 
@@ -50,20 +52,7 @@ def driven_path(
 
     ``whole``: else the target is what was left before, of which crumbs are left again.
     """
-    driver, recorder, least = None, Recorder(), math.inf
-    for heading in _headings(space, runs):
-        trial = Driver(
-            space, options.min_turn_radius, Pose2D(space.start.x, space.start.y, heading)
-        )
-        record = Recorder()
-        _drive(trial, runs, record, options)
-        path, _ = trial.track.arrays()
-        left = target.missed_area(path)
-        if left < least:
-            driver, recorder, least = trial, record, left
-        if left < 0.1 * target.area:
-            break
-    assert driver is not None  # there is at least one heading
+    driver, recorder = _from_start(runs, space, options, target)
     path, gear = driver.track.arrays()
     parts = tuple(recorder.parts)
     if len(path) > 1:
@@ -74,9 +63,9 @@ def driven_path(
         if longer is not None:
             path, gear, parts = _visited(*longer, space, radius, target, smallest)
     left = target.missed_area(path)
-    if left > 0.02 * target.area:
+    if left > max(0.02 * target.area, _SAID):
         notes.append(
-            f"{left:.2f} m² cannot be swept with a turning radius of "
+            f"{left:.2f} m² is missed: no way was found there with a turning radius of "
             f"{in_words(options.min_turn_radius)} and a clearance of {in_words(options.clearance)}."
         )
     if len(path) < 2:
@@ -87,6 +76,34 @@ def driven_path(
     path, gear, moved = without_jerks(path, gear)
     path, gear, there = without_crumbs(path, gear, space)
     return path, gear, _moved_parts(parts, there[moved])
+
+
+def _from_start(
+    runs: list[Run], space: FreeSpace, options: PlanOptions, target: Target
+) -> tuple[Driver, Recorder]:
+    """The runs driven from the start with the heading from which most of them is reached."""
+    best: tuple[Driver, Recorder] | None = None
+    least = math.inf
+    headings = _headings(space, runs)
+    # A heading that does not even get to the first run is given up, unless all are like that.
+    for heading, anyway in (*((heading, False) for heading in headings), (headings[0], True)):
+        if anyway and best is not None:
+            break
+        driver = Driver(
+            space, options.min_turn_radius, Pose2D(space.start.x, space.start.y, heading)
+        )
+        recorder = Recorder()
+        _drive(driver, runs, recorder, options, anyway or len(headings) == 1)
+        if not (driver.track.last or anyway):
+            continue
+        path, _ = driver.track.arrays()
+        left = target.missed_area(path)
+        if best is None or left < least:
+            best, least = (driver, recorder), left
+        if left < 0.1 * target.area:
+            break
+    assert best is not None  # the last one is not given up
+    return best
 
 
 def _visited(
@@ -154,11 +171,20 @@ def _headings(space: FreeSpace, runs: list[Run]) -> list[float]:
     return [wrap_angle(along + turn * math.pi / 2) for turn in (0, 2, 1, 3)]
 
 
-def _drive(driver: Driver, runs: list[Run], recorder: Recorder, options: PlanOptions) -> None:
-    """Drives the runs; leaves out what cannot be reached or followed."""
+def _drive(
+    driver: Driver,
+    runs: list[Run],
+    recorder: Recorder,
+    options: PlanOptions,
+    anyway: bool = True,
+) -> None:
+    """Drives the runs; leaves out what cannot be reached or followed, or with the first of them
+    all, unless it is to be driven ``anyway``."""
     for run in runs:
         here = driver.track.pose.position
         points = driver.enter(run.points)
+        if points is None and not (anyway or driver.track.last):
+            return
         if points is None:
             recorder.close("link", driver.track.last)
             continue

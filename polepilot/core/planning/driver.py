@@ -43,6 +43,8 @@ _MOST_TURNS = 80
 _SHORT = 0.15
 """A leg shorter than this is not worth a manoeuvre of its own, metres."""
 _MOST_TRIES = 20
+_MOST_ZIGZAGS = 2
+"""To so many legs a way to and fro is looked for from one place: who gets to none of them is stuck."""
 _CURVES = 6
 """So many curves to a pose are looked at."""
 _AHEAD = (0.0, -0.6, 1.0, 1.6, 2.4)
@@ -59,6 +61,8 @@ class Driver:
         self._radius = radius * _RADIUS_MARGIN
         self.track = Track(pose, self._radius)
         self._patience = _PATIENCE
+        self._stuck: Pose2D | None = None
+        """Where no way to a leg was found."""
 
     def follow(self, points: Points, cut: float = CUT) -> None:
         """Drives along ``points``, on whose first leg the track already stands.
@@ -324,7 +328,9 @@ class Driver:
 
         Where a leg cannot be entered forward, it is driven backward, and so is what follows.
         """
-        tries = 0
+        tries = zigzags = 0
+        if self.track.pose == self._stuck:
+            zigzags = _MOST_ZIGZAGS
         for leg in range(index, len(points) - 1):
             step = points[leg + 1] - points[leg]
             length = float(np.hypot(*step))
@@ -340,12 +346,15 @@ class Driver:
             if self._connect_here(there, heading):
                 return leg + 1
             self.track.restore(saved)
-            if self._zigzag(points[leg], points[leg + 1]):
-                return leg + 1
+            if zigzags < _MOST_ZIGZAGS:
+                zigzags += 1
+                if self._zigzag(points[leg], points[leg + 1]):
+                    return leg + 1
             if self.connect(there, heading):
                 return leg + 1
             if tries >= _MOST_TRIES:
                 break
+        self._stuck = self.track.pose
         return None
 
     def _zigzag(self, first: Points, last: Points) -> bool:

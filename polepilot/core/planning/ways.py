@@ -24,7 +24,9 @@ Indices = NDArray[np.intp]
 
 _STEPS = ((0.33, 7), (0.2, 13))
 """Length of a piece, in turning radii, and how many there are at most; the longer ones first."""
-_MOST_STATES = 1000
+_MOST_LEVELS = 25
+_STATES = 40
+"""So many poses are gone on from on each level, for each of the levels that there are at most."""
 _MOST_CHECKS = 30
 """So many ways are looked at closely on each level."""
 _SAMPLES = 5
@@ -92,40 +94,50 @@ class _Goal:
 
 
 def way_to_place(
-    space: FreeSpace, poses: Array, radius: float, place: Point, levels: int = 99
+    space: FreeSpace,
+    poses: Array,
+    radius: float,
+    place: Point,
+    levels: int = _MOST_LEVELS,
 ) -> tuple[int, Curve] | None:
     """A curve to a place, with whatever heading there, and from which row of ``poses`` it leads.
 
     ``poses``: N x 3, x, y, heading, all of them in the free space. ``radius``: of all arcs,
-    metres. ``levels``: after so many pieces the search is given up. None: no way was found.
+    metres. ``levels``: after so many pieces the search is given up; it is the narrower the
+    fewer there are. None: no way was found.
     """
     x, y = place
 
-    def ends(states: _States) -> list[_End]:
-        return _ends_at(states, x, y, radius)
+    def ends(here: _States) -> list[_End]:
+        return _ends_at(here, x, y, radius)
 
-    def promise(states: _States) -> Array:
-        return np.asarray(np.hypot(states.x - x, states.y - y))
+    def promise(here: _States) -> Array:
+        return np.asarray(np.hypot(here.x - x, here.y - y))
 
     return _search(space, poses, radius, _Goal(ends, promise), levels)
 
 
 def way_to_line(
-    space: FreeSpace, poses: Array, radius: float, first: Point, last: Point, levels: int = 99
+    space: FreeSpace,
+    poses: Array,
+    radius: float,
+    first: Point,
+    last: Point,
+    levels: int = _MOST_LEVELS,
 ) -> tuple[int, Curve] | None:
     """A curve to ``first`` that ends on the line to ``last``, looking along it or away from it."""
     heading = math.atan2(last[1] - first[1], last[0] - first[0])
     length = math.dist(first, last)
     cos, sin = math.cos(heading), math.sin(heading)
 
-    def ends(states: _States) -> list[_End]:
-        return _ends_on(states, first, heading, radius)
+    def ends(here: _States) -> list[_End]:
+        return _ends_on(here, first, heading, radius)
 
-    def promise(states: _States) -> Array:
-        along = cos * (states.x - first[0]) + sin * (states.y - first[1])
-        across = -sin * (states.x - first[0]) + cos * (states.y - first[1])
+    def promise(here: _States) -> Array:
+        along = cos * (here.x - first[0]) + sin * (here.y - first[1])
+        across = -sin * (here.x - first[0]) + cos * (here.y - first[1])
         beyond = np.maximum(0.0, np.maximum(-along, along - length))
-        askew = np.abs(np.sin(states.heading - heading))
+        askew = np.abs(np.sin(here.heading - heading))
         return np.asarray(np.hypot(across, beyond) + radius * askew)
 
     return _search(space, poses, radius, _Goal(ends, promise), levels)
@@ -145,10 +157,13 @@ def _search(
             return found
         step = share * radius
         trail = [begin]
-        known: set[int] = set()
+        known: Indices = np.zeros(0, dtype=np.int64)
         for _ in range(min(most, levels)):
             every = _moved(space, trail[-1], radius, step)
-            states = every.take(_chosen(every, known, step, goal.promise(every)))
+            cells = _cells(every, step)
+            rows = _chosen(every, cells, known, goal.promise(every))[: _STATES * levels]
+            known = np.concatenate([known, cells[rows]])
+            states = every.take(rows)
             if not len(states):
                 break
             trail.append(states)
@@ -335,18 +350,18 @@ def _moved(space: FreeSpace, states: _States, radius: float, step: float) -> _St
     )
 
 
-def _chosen(states: _States, known: set[int], step: float, promise: Array) -> Indices:
-    """Rows of states unlike those known so far, the most promising ones."""
+def _cells(states: _States, step: float) -> Indices:
+    """Numbers of which those of states that count as one are the same."""
     size = step / 4
     turn = np.round(states.heading / _TURN).astype(np.int64) % round(math.tau / _TURN)
     x, y = (np.floor(values / size).astype(np.int64) for values in (states.x, states.y))
     cells = ((x % 1_000_003) * 1_000_003 + y % 1_000_003) * 100 + turn * 2 + states.move % 2
-    chosen: list[int] = []
-    for row in np.argsort(np.round(states.cost + promise, 6), kind="stable").tolist():
-        cell = int(cells[row])
-        if cell not in known:
-            known.add(cell)
-            chosen.append(row)
-            if len(chosen) == _MOST_STATES:
-                break
-    return np.array(chosen, dtype=np.intp)
+    return np.asarray(cells)
+
+
+def _chosen(states: _States, cells: Indices, known: Indices, promise: Array) -> Indices:
+    """Rows of states unlike those known so far and unlike each other, the most promising first."""
+    order = np.argsort(np.round(states.cost + promise, 6), kind="stable")
+    first = np.unique(cells[order], return_index=True)[1]
+    rows = order[np.sort(first)]
+    return rows[~np.isin(cells[rows], known)]

@@ -30,7 +30,7 @@ def without_crumbs(
 
     Also its gears, and for each point of the old path the index of the new one.
     """
-    fixed = np.r_[0, np.flatnonzero(np.diff(gears)) + 1, len(path) - 1]
+    fixed: Indices = np.r_[0, np.flatnonzero(np.diff(gears)) + 1, len(path) - 1]
     kept = np.ones(len(path), dtype=bool)
     for shortest, anyway in ((_CRUMB, True), (SHORTEST, False)):
         rows = np.flatnonzero(kept)

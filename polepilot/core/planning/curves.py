@@ -26,6 +26,8 @@ CHANGE = 0.5
 """What a change of gear costs, as metres of path."""
 _MOST = 8
 """So many curves between two poses are worked out."""
+_SPOTS = 5
+"""Points on a piece of a curve that are looked at first."""
 STEP = math.radians(5.0)
 """Arcs are drawn with a vertex at least every so many radians."""
 
@@ -100,6 +102,25 @@ def sample(
     points[1:, 0] = x + chord * np.cos(heading + turned)
     points[1:, 1] = y + chord * np.sin(heading + turned)
     return points, np.where(length > 0, 1, -1).astype(np.int8), pose
+
+
+def spots(poses: Array, curves: Sequence[Curve], radius: float) -> Array:
+    """Points on curves, N x M x 2, evenly on each piece: where one of them is not free a curve is
+    not. ``poses``: where they begin, N x 3 or for all of them 1 x 3."""
+    x, y, heading = np.broadcast_to(poses, (len(curves), 3)).T
+    found: list[Array] = [np.zeros((len(curves), 0, 2))]
+    shares = np.arange(1, _SPOTS + 1) / _SPOTS
+    for index in range(max(map(len, curves), default=0)):
+        pieces = [curve[index] if index < len(curve) else ("S", 0.0) for curve in curves]
+        side = np.array([_SIDES[kind] for kind, _ in pieces])
+        length = np.array([length for _, length in pieces])[:, None] * shares
+        bend = side[:, None] * length / (2 * radius)
+        chord = length * np.sinc(bend / math.pi)
+        there_x = x[:, None] + chord * np.cos(heading[:, None] + bend)
+        there_y = y[:, None] + chord * np.sin(heading[:, None] + bend)
+        found.append(np.stack([there_x, there_y], axis=2))
+        x, y, heading = there_x[:, -1], there_y[:, -1], heading + 2 * bend[:, -1]
+    return np.concatenate(found, axis=1)
 
 
 def shortest_curves(start: Pose2D, goal: Pose2D, radius: float, change: float) -> list[Curve]:

@@ -10,6 +10,7 @@ which is always possible. What cannot be connected at all is left out, and said.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ from polepilot.core.planning.curves import (
     joined,
     sample,
     shortest_curves_each,
+    spots,
 )
 from polepilot.core.planning.space import FreeSpace
 from polepilot.core.planning.track import PLAIN, Track
@@ -44,7 +46,9 @@ _SHORT = 0.15
 """A leg shorter than this is not worth a manoeuvre of its own, metres."""
 _MOST_TRIES = 20
 _MOST_ZIGZAGS = 2
-"""To so many legs a way to and fro is looked for from one place: who gets to none of them is stuck."""
+"""To so many legs a way to and fro is looked for from one place: who gets to none is stuck."""
+_AT_ONCE = 24
+"""So many curves are looked at at once."""
 _CURVES = 6
 """So many curves to a pose are looked at."""
 _AHEAD = (0.0, -0.6, 1.0, 1.6, 2.4)
@@ -212,10 +216,19 @@ class Driver:
                 whole = joined((("S", -back), *curve, ("S", -ahead)))
                 found.append((curve_cost(whole), whole))
         found.sort(key=lambda entry: entry[0])
-        for cost, curve in found:
-            if self._fits(pose, curve):
-                return cost, curve
-        return None
+        return next(
+            (entry for entry in self._likely(pose, found) if self._fits(pose, entry[1])), None
+        )
+
+    def _likely(
+        self, pose: Pose2D, found: list[tuple[float, Curve]]
+    ) -> Iterator[tuple[float, Curve]]:
+        """Those of some curves of which some points are free, which is soon looked at."""
+        for first in range(0, len(found), _AT_ONCE):
+            some = found[first : first + _AT_ONCE]
+            points = spots(np.array([pose]), [curve for _, curve in some], self._radius)
+            free = self._space.holds_each(points.reshape(-1, 2)).reshape(len(some), -1)
+            yield from (some[row] for row in np.flatnonzero(free.all(axis=1)).tolist())
 
     def _along_path(self, place: geometry.Point, heading: float | None) -> bool:
         """Along the shortest path, all of its corners turned; leaves the track half-way if not."""

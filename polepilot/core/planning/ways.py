@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polepilot.core.geometry import Point, Pose2D
-from polepilot.core.planning.curves import CHANGE, Curve, joined, sample
+from polepilot.core.planning.curves import CHANGE, Curve, joined, sample, spots
 from polepilot.core.planning.space import FreeSpace
 
 Array = NDArray[np.float64]
@@ -29,8 +29,6 @@ _STATES = 40
 """So many poses are gone on from on each level, for each of the levels that there are at most."""
 _MOST_CHECKS = 30
 """So many ways are looked at closely on each level."""
-_SAMPLES = 5
-"""Points on a piece of a curve that are looked at first."""
 _SHORTEST = 0.03
 """Pieces shorter than this are not driven, metres."""
 _TURN = math.radians(8.0)
@@ -181,7 +179,10 @@ def _checked(
     ends = sorted(goal.ends(states), key=lambda end: (round(end.cost, 6), end.row))
     if not ends:
         return None
-    free = space.holds_each(_some_points(states, ends, radius).reshape(-1, 2))
+    rows = np.array([end.row for end in ends], dtype=np.intp)
+    poses = np.stack([states.x[rows], states.y[rows], states.heading[rows]], axis=1)
+    points = spots(poses, [end.curve for end in ends], radius)
+    free = space.holds_each(points.reshape(-1, 2))
     whole = np.flatnonzero(free.reshape(len(ends), -1).all(axis=1))
     for index in whole[:_MOST_CHECKS].tolist():
         start, curve = _traced(trail, ends[index].row, ends[index].curve, step)
@@ -190,25 +191,6 @@ def _checked(
         if space.holds_points(sample(pose, curve, radius)[0]):
             return start, curve
     return None
-
-
-def _some_points(states: _States, ends: list[_End], radius: float) -> Array:
-    """Points on last curves, ends x points x 2: where one is not free the curve is not."""
-    rows = np.array([end.row for end in ends], dtype=np.intp)
-    x, y, heading = states.x[rows], states.y[rows], states.heading[rows]
-    found: list[Array] = [np.zeros((len(ends), 0, 2))]
-    shares = np.arange(1, _SAMPLES + 1) / _SAMPLES
-    for piece in range(max((len(end.curve) for end in ends), default=0)):
-        pieces = [end.curve[piece] if piece < len(end.curve) else ("S", 0.0) for end in ends]
-        side = np.array([{"S": 0.0, "L": 1.0, "R": -1.0}[kind] for kind, _ in pieces])
-        length = np.array([length for _, length in pieces])[:, None] * shares
-        bend = side[:, None] * length / (2 * radius)
-        chord = length * np.sinc(bend / math.pi)
-        spots_x = x[:, None] + chord * np.cos(heading[:, None] + bend)
-        spots_y = y[:, None] + chord * np.sin(heading[:, None] + bend)
-        found.append(np.stack([spots_x, spots_y], axis=2))
-        x, y, heading = spots_x[:, -1], spots_y[:, -1], heading + 2 * bend[:, -1]
-    return np.concatenate(found, axis=1)
 
 
 def _traced(trail: list[_States], row: int, end: Curve, step: float) -> tuple[int, Curve]:

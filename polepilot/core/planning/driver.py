@@ -29,7 +29,7 @@ from polepilot.core.planning.curves import (
 )
 from polepilot.core.planning.space import FreeSpace
 from polepilot.core.planning.track import PLAIN, Track
-from polepilot.core.planning.turns import turns_round
+from polepilot.core.planning.turns import prepare, turns_round
 from polepilot.core.planning.ways import way_to_line
 
 Points = NDArray[np.float64]
@@ -74,6 +74,7 @@ class Driver:
         What does not fit is left out.
         """
         points = _tidy(points)
+        prepare(_wide_turns(points, self._radius, cut), self._radius)
         index = 1
         while index < len(points):
             corner = points[index]
@@ -313,27 +314,29 @@ class Driver:
             self.track.straight_to(corner)
             return True
         room_before = before + self.track.straight
-        options = [
-            way
-            for way in turns_round(round(turn, 9), round(self._radius, 9))
-            if -way.lead <= room_before + 1e-9
-            and way.stop <= after + 1e-9
-            and (way.visit or not 0 <= before + way.lead < self.track.reserve)
-        ]
-        if math.isinf(cut):
-            options.sort(key=lambda way: way.cost - 20 * min(way.cut, 0.5) ** 2)
-        else:
-            options.sort(key=lambda way: (way.cut > cut, way.cost))
         cos, sin = math.cos(pose.heading), math.sin(pose.heading)
         turned = np.array([[cos, sin], [-sin, cos]])
         start = np.array(pose.position)
         corner_here = start + before * turned[0]
-        for way in options[:_MOST_TURNS]:
-            points = np.vstack([start, way.points @ turned + corner_here])
-            if self._space.holds_points(points):
-                self.track.append(way.after(before))
-                self.track.pose = Pose2D(*self.track.pose.position, heading)
-                return True
+        for every in (False, True):
+            options = [
+                way
+                for way in turns_round(turn, self._radius, every)
+                if -way.lead <= room_before + 1e-9
+                and way.stop <= after + 1e-9
+                and (way.visit or not 0 <= before + way.lead < self.track.reserve)
+                and (every or way.cut <= cut)
+            ]
+            if math.isinf(cut):
+                options.sort(key=lambda way: way.cost - 20 * min(way.cut, 0.5) ** 2)
+            else:
+                options.sort(key=lambda way: (way.cut > cut, way.cost))
+            for way in options[:_MOST_TURNS]:
+                points = np.vstack([start, way.points @ turned + corner_here])
+                if self._space.holds_points(points):
+                    self.track.append(way.after(before))
+                    self.track.pose = Pose2D(*self.track.pose.position, heading)
+                    return True
         return False
 
     def _resume(self, points: Points, index: int) -> int | None:
@@ -386,6 +389,17 @@ class Driver:
 
     def _fits(self, pose: Pose2D, curve: Curve) -> bool:
         return self._space.holds_points(sample(pose, curve, self._radius)[0])
+
+
+def _wide_turns(points: Points, radius: float, cut: float) -> Iterator[float]:
+    """The turns at corners of a line that are no mere bends for a wheel of ``radius``."""
+    steps = np.diff(points, axis=0)
+    lengths = np.hypot(*steps.T)
+    turns = np.abs((np.diff(np.arctan2(steps[:, 1], steps[:, 0])) + math.pi) % math.tau - math.pi)
+    half = np.minimum(turns, 3.0) / 2
+    room = np.minimum(lengths[:-1], lengths[1:]) / 2
+    wide = (radius * np.tan(half) > room) | (radius * (1 / np.cos(half) - 1) > cut)
+    yield from turns[wide].tolist()
 
 
 def _tidy(points: Points) -> Points:

@@ -6,6 +6,7 @@ A curve of Reeds and Shepp between the two legs, begun before, at, or beyond the
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -29,7 +30,9 @@ _CURVES = 4
 """So many curves between two places are looked at."""
 
 
-_PLACES: tuple[tuple[float, float, bool, bool], ...] = (
+_Place = tuple[float, float, bool, bool]
+
+_PLACES: tuple[_Place, ...] = (
     *((-share, share, False, False) for share in (0.25, 0.5, 0.75, 1.0)),
     *(
         (first, last, True, False)
@@ -47,6 +50,10 @@ _PLACES: tuple[tuple[float, float, bool, bool], ...] = (
 )
 """Where turns begin on the way in and end on the way out, in shares of what an arc needs; whether
 the corner is driven to before that, and whether the robot goes back to it after that."""
+_USUAL = (*_PLACES[:5], (0, 0.5, True, False))
+_DIGITS = 5
+"""Turns are told apart to so many digits."""
+_MOST_KNOWN = 8000
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,48 +93,67 @@ def _points(begin: float, curve: Curve, radius: float) -> Points:
     return sample(Pose2D(begin, 0.0, 0.0), curve, radius)[0]
 
 
-def turns_round(turn: float, radius: float) -> tuple[Turn, ...]:
-    """Ways round a corner of ``turn`` radians, the cheapest first."""
-    return _left_turns(turn, radius) if turn >= 0 else _right_turns(-turn, radius)
+_KNOWN: dict[tuple[float, float, bool], tuple[Turn, ...]] = {}
 
 
-@lru_cache(maxsize=4000)
-def _right_turns(turn: float, radius: float) -> tuple[Turn, ...]:
-    """The mirror images of those to the left."""
+def turns_round(turn: float, radius: float, every: bool = True) -> tuple[Turn, ...]:
+    """Ways round a corner of ``turn`` radians, the cheapest first; not ``every`` one: only of the
+    kinds that nearly always are the cheapest that fit, which is sooner worked out."""
+    turn = round(turn, _DIGITS)
+    key = (turn, radius, every)
+    if key not in _KNOWN:
+        if len(_KNOWN) > _MOST_KNOWN:
+            _KNOWN.clear()
+        if turn < 0:
+            _KNOWN[key] = tuple(map(_mirrored, turns_round(-turn, radius, every)))
+        else:
+            _KNOWN[key] = _left_turns([turn], radius, _PLACES if every else _USUAL)[0]
+    return _KNOWN[key]
+
+
+def prepare(turns: Iterable[float], radius: float) -> None:
+    """Works out the usual ways round many corners at once, which takes less time."""
+    wanted = {round(abs(turn), _DIGITS) for turn in turns}
+    new = sorted(turn for turn in wanted if (turn, radius, False) not in _KNOWN)
+    if not new:
+        return
+    for turn, ways in zip(new, _left_turns(new, radius, _USUAL), strict=True):
+        _KNOWN[turn, radius, False] = ways
+
+
+def _mirrored(way: Turn) -> Turn:
+    """The same to the other side."""
     side = {"L": "R", "R": "L", "S": "S"}
-    return tuple(
-        replace(
-            way,
-            curve=tuple((side[kind], length) for kind, length in way.curve),
-        )
-        for way in _left_turns(turn, radius)
-    )
+    return replace(way, curve=tuple((side[kind], length) for kind, length in way.curve))
 
 
-@lru_cache(maxsize=4000)
-def _left_turns(turn: float, radius: float) -> tuple[Turn, ...]:
-    """Ways round a corner of ``turn`` radians to the left, the cheapest first."""
-    legs = radius * math.tan(min(abs(turn), math.radians(120)) / 2)
-    out = np.array([math.cos(turn), math.sin(turn)])
-    least = _SHORTEST if abs(turn) * radius > _SHORTEST else 0.0
+def _left_turns(
+    turns: Sequence[float], radius: float, places: Sequence[_Place]
+) -> list[tuple[Turn, ...]]:
+    """Ways round corners of some turns to the left, in radians; the cheapest first."""
+    arcs = [radius * math.tan(min(turn, math.radians(120)) / 2) for turn in turns]
     ends = [
         (
             Pose2D(legs * first, 0.0, 0.0),
             Pose2D(legs * last * math.cos(turn), legs * last * math.sin(turn), wrap_angle(turn)),
         )
-        for first, last, _, _ in _PLACES
+        for turn, legs in zip(turns, arcs, strict=True)
+        for first, last, _, _ in places
     ]
-    every = shortest_curves_each(ends, radius, CHANGE, _CURVES)
+    least = [_SHORTEST if turn * radius > _SHORTEST else 0.0 for turn in turns]
     found = [
-        (place, curve)
-        for place, curves in enumerate(every)
+        (row // len(places), places[row % len(places)], curve)
+        for row, curves in enumerate(shortest_curves_each(ends, radius, CHANGE, _CURVES))
         for curve in curves
-        if all(abs(length) >= least for _, length in curve)
+        if all(abs(length) >= least[row // len(places)] for _, length in curve)
     ]
-    first, last = legs * np.array([_PLACES[place][:2] for place, _ in found]).reshape(-1, 2).T
-    visit, finish = np.array([_PLACES[place][2:] for place, _ in found], bool).reshape(-1, 2).T
+    of = np.array([corner for corner, _, _ in found], dtype=np.intp)
+    legs, angles = np.array(arcs)[of], np.array(turns)[of]
+    out = np.stack([np.cos(angles), np.sin(angles)], axis=1)[:, None]
+    first, last = legs * np.array([place[:2] for _, place, _ in found]).reshape(-1, 2).T
+    visit, finish = np.array([place[2:] for _, place, _ in found], bool).reshape(-1, 2).T
     finish = finish | (last < 0)  # what lies before the corner must be free as well
-    sides, lengths = _columns([curve for _, curve in found])
+    sides, lengths = _columns([curve for _, _, curve in found])
     # What a curve leaves out of the legs: the way in up to the corner, the way out from there on.
     shares = np.array([0.0, 0.25, 0.5, 0.75])[:, None]
     beyond = np.maximum(shares, shares[1])
@@ -143,21 +169,21 @@ def _left_turns(turn: float, radius: float) -> tuple[Turn, ...]:
     pieces = np.column_stack([begin, np.where(visit, first, 0.0), lengths, end])
     cost = np.abs(pieces).sum(axis=1) + CHANGE * _changes(pieces)
     cost = np.round(cost + 20 * np.minimum(cut, 0.5) ** 2 - 10.0 - stop, 9)
-    ways: list[Turn] = []
+    ways: list[list[Turn]] = [[] for _ in turns]
     for row in np.argsort(cost, kind="stable").tolist():
-        curve = joined((*found[row][1], ("S", float(end[row]))))
-        ways.append(
+        corner, _, curve = found[row]
+        ways[corner].append(
             Turn(
                 float(cost[row]),
                 float(cut[row]),
                 float(first[row]),
                 bool(visit[row]),
                 float(stop[row]),
-                curve,
+                joined((*curve, ("S", float(end[row])))),
                 radius,
             )
         )
-    return tuple(ways)
+    return list(map(tuple, ways))
 
 
 def _columns(curves: list[Curve]) -> tuple[Points, Points]:

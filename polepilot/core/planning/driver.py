@@ -44,6 +44,8 @@ _MOST_TURNS = 80
 """So many ways round one corner are tried, the cheapest first."""
 _SHORT = 0.15
 """A leg shorter than this is not worth a manoeuvre of its own, metres."""
+_BRIEF = 0.45
+"""Nor is one shorter than this worth backing out for, if the next one is got onto from here."""
 _MOST_TRIES = 20
 _MOST_ZIGZAGS = 2
 """To so many legs a way to and fro is looked for from one place: who gets to none is stuck."""
@@ -65,6 +67,8 @@ class Driver:
         self._radius = radius * _RADIUS_MARGIN
         self.track = Track(pose, self._radius)
         self._patience = _PATIENCE
+        self._thorough = True
+        """Whether unusual ways round corners are looked at as well."""
         self._stuck: Pose2D | None = None
         """Where no way to a leg was found."""
 
@@ -166,16 +170,19 @@ class Driver:
             return False
         self._patience -= 1
         saved = self.track.save()
+        self._thorough = False
         for distance in _BACK_OUT:
             # From the same place each time: backing out twice would lead in again.
             enough = self.track.back_out(distance)
-            if self._connect_here(place, heading):
+            found = self._connect_here(place, heading)
+            if found:
                 self._patience = min(self._patience + 1, _PATIENCE)
-                return True
+                break
             self.track.restore(saved)
             if not enough:
                 break
-        return False
+        self._thorough = True
+        return found
 
     def _connect_here(self, place: geometry.Point, heading: float | None) -> bool:
         """The cheaper of one curve and the shortest path with its corners turned."""
@@ -318,7 +325,7 @@ class Driver:
         turned = np.array([[cos, sin], [-sin, cos]])
         start = np.array(pose.position)
         corner_here = start + before * turned[0]
-        for every in (False, True):
+        for every in (False, True) if self._thorough else (False,):
             options = [
                 way
                 for way in turns_round(turn, self._radius, every)
@@ -348,30 +355,35 @@ class Driver:
         if self.track.pose == self._stuck:
             zigzags = _MOST_ZIGZAGS
         for leg in range(index, len(points) - 1):
-            step = points[leg + 1] - points[leg]
-            length = float(np.hypot(*step))
+            length = math.dist(points[leg], points[leg + 1])
             if length < _SHORT and leg + 2 < len(points):
                 continue
-            heading = math.atan2(step[1], step[0])
-            there = (float(points[leg, 0]), float(points[leg, 1]))
             tries += 1
-            if self._connect_here(there, heading):
+            if self._onto(points, leg):
                 return leg + 1
-            saved = self.track.save()
-            self.track.turn_round()
-            if self._connect_here(there, heading):
-                return leg + 1
-            self.track.restore(saved)
             if zigzags < _MOST_ZIGZAGS:
                 zigzags += 1
                 if self._zigzag(points[leg], points[leg + 1]):
                     return leg + 1
-            if self.connect(there, heading):
+            if length < _BRIEF and leg + 2 < len(points) and self._onto(points, leg + 1):
+                return leg + 2
+            if self.connect(*_begin(points, leg)):
                 return leg + 1
             if tries >= _MOST_TRIES:
                 break
         self._stuck = self.track.pose
         return None
+
+    def _onto(self, points: Points, leg: int) -> bool:
+        """Gets onto a leg at its beginning from here, whichever way round."""
+        if self._connect_here(*_begin(points, leg)):
+            return True
+        saved = self.track.save()
+        self.track.turn_round()
+        if self._connect_here(*_begin(points, leg)):
+            return True
+        self.track.restore(saved)
+        return False
 
     def _zigzag(self, first: Points, last: Points) -> bool:
         """Gets onto a leg at its beginning in short pieces to and fro, whichever way round."""
@@ -400,6 +412,12 @@ def _wide_turns(points: Points, radius: float, cut: float) -> Iterator[float]:
     room = np.minimum(lengths[:-1], lengths[1:]) / 2
     wide = (radius * np.tan(half) > room) | (radius * (1 / np.cos(half) - 1) > cut)
     yield from turns[wide].tolist()
+
+
+def _begin(points: Points, leg: int) -> tuple[geometry.Point, float]:
+    """Where a leg of a line begins, and its heading."""
+    step = points[leg + 1] - points[leg]
+    return (float(points[leg, 0]), float(points[leg, 1])), math.atan2(step[1], step[0])
 
 
 def _tidy(points: Points) -> Points:

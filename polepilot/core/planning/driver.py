@@ -46,7 +46,7 @@ _SHORT = 0.15
 """A leg shorter than this is not worth a manoeuvre of its own, metres."""
 _BRIEF = 0.45
 """Nor is one shorter than this worth backing out for, if the next one is got onto from here."""
-_MOST_TRIES = 20
+_MOST_TRIES = 10
 _MOST_ZIGZAGS = 2
 """To so many legs a way to and fro is looked for from one place: who gets to none is stuck."""
 _AT_ONCE = 24

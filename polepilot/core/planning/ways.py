@@ -101,8 +101,8 @@ def way_to_place(
     """A curve to a place, with whatever heading there, and from which row of ``poses`` it leads.
 
     ``poses``: N x 3, x, y, heading, all of them in the free space. ``radius``: of all arcs,
-    metres. ``levels``: after so many pieces the search is given up; it is the narrower the
-    fewer there are. None: no way was found.
+    metres. ``levels``: after so many pieces, if they are given, a search is given up that is
+    the narrower the fewer there are. None: no way was found.
     """
     x, y = place
 
@@ -150,7 +150,7 @@ def _search(
     x, y, heading = poses[:, :3].T
     begin = _States(x, y, heading, np.zeros(count), np.full(count, -1), np.arange(count))
     found = _checked(space, [begin], radius, goal, 0.0)
-    for share, most in _STEPS:
+    for share, most in _STEPS if levels == _MOST_LEVELS else _STEPS[:1]:
         if found is not None:
             return found
         step = share * radius

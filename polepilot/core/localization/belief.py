@@ -18,6 +18,8 @@ class Belief:
     status: Status = Status.FIXING
     reason: str = ""
     """Why the status is not TRACKING, for a person; empty while tracking."""
+    _unconfirmed: str = ""
+    """The reason that a new pose has from the beginning: no event."""
 
     @property
     def lost(self) -> bool:
@@ -27,9 +29,10 @@ class Belief:
         """There is no pose."""
         self.status, self.reason = Status.FIXING, reason
 
-    def accept(self) -> None:
-        """There is a pose that was checked."""
-        self.status, self.reason = Status.TRACKING, ""
+    def accept(self, unconfirmed: str = "") -> None:
+        """There is a pose that was checked; ``unconfirmed``: why it may be wrong all the same."""
+        self.status = Status.DEGRADED if unconfirmed else Status.TRACKING
+        self.reason = self._unconfirmed = unconfirmed
 
     def lose(self, stamp: float, reason: str) -> None:
         if self.status is not Status.LOST:
@@ -38,15 +41,22 @@ class Belief:
 
     def doubt(self, stamp: float, reason: str) -> None:
         """DEGRADED; the first reason stays."""
-        if self.status is Status.TRACKING:
-            self._set(stamp, Status.DEGRADED, reason)
+        if self._untroubled:
+            self._degrade(stamp, reason)
 
     def judge(
-        self, stamp: float, moving: float, sigma: float, doubted: bool, suspected: str = ""
+        self,
+        stamp: float,
+        moving: float,
+        sigma: float,
+        doubted: bool,
+        suspected: str = "",
+        unconfirmed: str = "",
     ) -> None:
         """By how long it has been driven without a correction (s), and how sure it is (m).
 
         ``suspected``: why the pose may be wrong all the same; empty where it may not.
+        ``unconfirmed``: likewise, from the beginning.
         """
         settings = self.settings
         if self.status in (Status.LOST, Status.FIXING):
@@ -59,13 +69,23 @@ class Belief:
         if sigma > settings.lost_sigma or moving > settings.lost_after:
             self.lose(stamp, reason)
         elif reason:
-            self._set(stamp, Status.DEGRADED, reason)
+            self._degrade(stamp, reason)
         elif not doubted:
-            self._set(stamp, Status.TRACKING, "")
+            before, self._unconfirmed = self._untroubled, unconfirmed
+            self.status = Status.DEGRADED if unconfirmed else Status.TRACKING
+            self.reason = unconfirmed
+            if not before:
+                text = unconfirmed or "The pose is certain again."
+                self.events.add(LocalizerEvent(stamp, "recovered", text))
 
-    def _set(self, stamp: float, status: Status, reason: str) -> None:
-        if status is not self.status:
-            code = "recovered" if status is Status.TRACKING else "degraded"
-            text = reason or "The pose is certain again."
-            self.events.add(LocalizerEvent(stamp, code, text))
-        self.status, self.reason = status, reason
+    @property
+    def _untroubled(self) -> bool:
+        """Nothing has happened to the pose since it was found."""
+        return self.status is Status.TRACKING or (
+            self.status is Status.DEGRADED and self.reason == self._unconfirmed
+        )
+
+    def _degrade(self, stamp: float, reason: str) -> None:
+        if self._untroubled:
+            self.events.add(LocalizerEvent(stamp, "degraded", reason))
+        self.status, self.reason = Status.DEGRADED, reason

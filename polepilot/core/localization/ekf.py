@@ -3,10 +3,11 @@
 The states: x, y, heading; the relative error of the speed; the steering's offset; the errors of
 the servo's and the motors' time constants, and of the time that the servo needs for a radian; the
 relative error of ranges; Legendre coefficients of the potentiometer's error over the pan range;
-and, for as many landmarks as `surveyed` names, the error of their mapped positions. All but the
-pose change slowly or never. Estimating them is what brings the error from decimetres to centimetres
-(the paper's one-landmark correction never corrects the heading); the map's errors repeat in every
-sighting of a landmark, and a filter that took them for noise would become too sure of itself.
+and, for as many landmarks as `surveyed` names, the error of their mapped positions: where the map
+has more, of those that were seen last. All but the pose change slowly or never. Estimating them is
+what brings the error from decimetres to centimetres (the paper's one-landmark correction never
+corrects the heading); the map's errors repeat in every sighting of a landmark, and a filter that
+took them for noise would become too sure of itself.
 """
 
 from __future__ import annotations
@@ -41,6 +42,8 @@ SPEED, STEERING, SERVO_LAG, MOTOR_LAG, SLOWNESS, RANGE, PAN = 3, 4, 5, 6, 7, 8, 
 PANS = 6
 STATES = PAN + PANS
 """States besides the map's errors."""
+_NO_ODOMETRY, _NO_PAN = (0.0,) * (RANGE - 3), (0.0,) * PANS
+"""What a measurement does not depend on."""
 
 
 class Innovation(NamedTuple):
@@ -76,9 +79,12 @@ class PoseFilter:
         noise: NoiseModel | None = None,
         gate: float = 16.0,
         surveyed: Sequence[int] = (),
+        *,
+        shared: bool = False,
     ) -> None:
         """``surveyed``: the landmarks whose positions' errors are states.
 
+        ``shared``: others take their places over, from the one that was not seen for longest.
         ``gate``: squared Mahalanobis distance beyond which a measurement is not taken.
         """
         self.wheelbase = wheelbase
@@ -86,6 +92,8 @@ class PoseFilter:
         self.noise = noise or NoiseModel()
         self.gate = gate
         self._places = {number: STATES + 2 * k for k, number in enumerate(surveyed)}
+        """Where in the state; if they are shared, the one seen last comes last. Never changed."""
+        self._shared = shared and bool(surveyed)
         size = STATES + 2 * len(surveyed)
         model = self.noise
         priors = (
@@ -119,7 +127,7 @@ class PoseFilter:
         other = PoseFilter.__new__(PoseFilter)
         other.wheelbase, other.camera_forward = self.wheelbase, self.camera_forward
         other.noise, other.gate = self.noise, self.gate
-        other._places = self._places
+        other._places, other._shared = self._places, self._shared
         other.state, other.covariance = self.state.copy(), self.covariance.copy()
         return other
 
@@ -185,6 +193,7 @@ class PoseFilter:
         for sighting, landmark in sightings:
             self.predict(history.steps(start, sighting.stamp))
             start = max(start, sighting.stamp)
+            self._make_room(landmark)
             innovation = self.innovation(sighting, landmark)
             if innovation.squared <= self.gate:
                 self.update(innovation)
@@ -231,18 +240,19 @@ class PoseFilter:
         ux, uy = dx / distance, dy / distance
         tx, ty = uy / distance, -ux / distance
         shapes = self._shapes(measurement)
-        jacobian = np.zeros((2, len(self.state)))
-        jacobian[:, :3] = (
-            (-ux * scale, -uy * scale, (ux * arm_y - uy * arm_x) * scale),
-            (tx, ty, tx * -arm_y + ty * arm_x - 1.0),
-        )
-        jacobian[0, RANGE] = distance
-        jacobian[1, PAN:STATES] = shapes
+        by_range = [-ux * scale, -uy * scale, (ux * arm_y - uy * arm_x) * scale, *_NO_ODOMETRY]
+        by_range += (distance, *_NO_PAN)
+        by_bearing = [tx, ty, tx * -arm_y + ty * arm_x - 1.0, *_NO_ODOMETRY, 0.0, *shapes]
+        rest = [0.0] * (len(self.state) - STATES)
+        by_range += rest
+        by_bearing += rest
         own = 0.0
         if place is not None:
-            jacobian[:, place : place + 2] = ((ux * scale, uy * scale), (-tx, -ty))
+            by_range[place : place + 2] = ux * scale, uy * scale
+            by_bearing[place : place + 2] = -tx, -ty
         else:
             own = noise.survey_sigma**2
+        jacobian = np.array((by_range, by_bearing))
         pan_error = sum(map(mul, shapes, bends))
         bearing_gap = wrap_angle(measurement.bearing - pan_error - math.atan2(dy, dx) + heading)
         bearing_variance = (
@@ -284,6 +294,7 @@ class PoseFilter:
         Returns whether it was taken, and how many metres it was off. One that does not pass though
         it is within ``tolerance`` metres says that the state is surer than it should be.
         """
+        self._make_room(landmark)
         innovation = self.innovation(measurement, landmark)
         if innovation.squared <= self.gate:
             self.update(innovation)
@@ -318,6 +329,26 @@ class PoseFilter:
         limit = self.noise.heading_limit**2
         if ph < limit:
             p[2, 2] = limit
+
+    def _make_room(self, landmark: Landmark) -> None:
+        """The error of its place becomes a state, instead of that of one not seen for long.
+
+        What was learnt with that one is kept; seen again, its error counts as a new one.
+        """
+        if not self._shared or next(reversed(self._places)) == landmark.id:
+            return
+        places = dict(self._places)
+        place = places.pop(landmark.id, None)
+        if place is None:
+            place = places.pop(next(iter(places)))
+            part = slice(place, place + 2)
+            self.state[part] = 0.0
+            self.covariance[part] = 0.0
+            self.covariance[:, part] = 0.0
+            for index in (place, place + 1):
+                self.covariance[index, index] = self.noise.survey_sigma**2
+        places[landmark.id] = place
+        self._places = places
 
     def _doubt(self, factor: float) -> None:
         """Trust the pose less: its standard deviations times ``factor``."""

@@ -20,12 +20,12 @@ class NoiseModel:
     """Of the speed, as a share of it: wheels slip."""
     steering_prior: float = math.radians(1.5)
     steering_walk: float = math.radians(0.02)
-    steering_noise: float = math.radians(0.2)
+    steering_noise: float = math.radians(0.27)
     servo_lag_prior: float = 0.06
     motor_lag_prior: float = 0.05
     slowness_prior: float = 0.20
     """Of the time that the servo needs for a radian, seconds."""
-    servo_doubt: float = 0.08
+    servo_doubt: float = 0.05
     """Density of the modelled wheel angle's error while the servo is on its way, as a share of
     the way that is left."""
     motor_doubt: float = 0.045

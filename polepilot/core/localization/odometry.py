@@ -26,10 +26,14 @@ from polepilot.core.observation import Odometry
 
 _SMALL_TURN = 1e-3
 """Below half of this turn (rad) series are used, whose error is then under 1e-13."""
+_RETUNED = 4.0
+"""Seconds of the past for which other constants of motors and servo matter."""
 _SLOWER = 0.15
 """How much slower (s/rad) the servo is with which the one believed in is compared. A derivative
 would be zero wherever the servo is believed to be fast enough not to matter, and nothing would
 ever tell that it is not."""
+_ALIKE = 1e-5
+"""Wheel angles (rad) that need not be told apart."""
 
 
 class Arc(NamedTuple):
@@ -206,9 +210,12 @@ class OdometryHistory:
         return self._following
 
     def retune(self, following: Following) -> None:
-        """Other constants, for the whole span."""
+        """Other constants, for the last seconds: what is older has long been settled."""
         self._following = following
-        for index in range(1, len(self._entries)):
+        if not self._stamps:
+            return
+        first = bisect_right(self._stamps, self._stamps[-1] - _RETUNED)
+        for index in range(max(first, 1), len(self._entries)):
             entry = self._entries[index]
             then = self._values(self._entries[index - 1], entry.stamp)
             self._entries[index] = _Entry(entry.stamp, entry.speed, entry.steering, *then)
@@ -242,6 +249,18 @@ class OdometryHistory:
                 steering = step.steering + offset
                 pose = advance(pose, scale * step.speed, steering, step.dt, self.wheelbase)
         return pose
+
+    def driven(
+        self, start: float, end: float, scale: float = 1.0, offset: float = 0.0
+    ) -> tuple[Pose2D, float]:
+        """The pose at ``end``, seen from that at ``start``, and the way as it was told, metres."""
+        pose, way = Pose2D(0.0, 0.0, 0.0), 0.0
+        for step in self.steps(start, end):
+            if step.speed:
+                steering = step.steering + offset
+                pose = advance(pose, scale * step.speed, steering, step.dt, self.wheelbase)
+                way += abs(step.speed) * step.dt
+        return pose, way
 
     def moved(self, start: float, end: float) -> tuple[float, float]:
         """Metres travelled and seconds spent moving between two moments."""
@@ -286,6 +305,7 @@ class OdometryHistory:
         then, slower = entry.steering_then, entry.slower_then
         steering = follow(entry.steering, then, age, servo, slowness)
         slowness += _SLOWER
-        if slower == then and abs(entry.steering - then.value) * slowness <= servo:
+        alike = abs(slower.value - then.value) < _ALIKE
+        if alike and abs(entry.steering - then.value) * slowness <= servo:
             return speed, steering, steering
         return speed, steering, follow(entry.steering, slower, age, servo, slowness)

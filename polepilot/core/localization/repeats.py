@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from polepilot.core.observation import RangeBearing
@@ -14,12 +14,13 @@ class Repeats:
 
     _last: dict[int, float] = field(default_factory=dict)
 
-    def fresh(self, measurements: Iterable[RangeBearing]) -> list[RangeBearing]:
+    def fresh(self, measurements: Sequence[RangeBearing]) -> list[RangeBearing]:
         """Those of landmarks that no earlier call had at the same moment.
 
         Two different ones of one landmark in one picture both stay: one of them may be misread.
         """
-        new = [m for m in dict.fromkeys(measurements) if self._last.get(m.landmark) != m.stamp]
+        several = measurements if len(measurements) == 1 else dict.fromkeys(measurements)
+        new = [m for m in several if self._last.get(m.landmark) != m.stamp]
         if len(self._last) > 1000:
             self._last.clear()
         self._last.update((m.landmark, m.stamp) for m in new)

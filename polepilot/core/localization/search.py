@@ -11,8 +11,6 @@ from collections import Counter, deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.landmark import Landmark
 from polepilot.core.localization.fix import Fix, FixRefusal, FixSettings, fix
@@ -98,7 +96,7 @@ class FixSearch:
             if sighting.stamp <= stamp and count < _PER_LANDMARK:
                 counts[sighting.landmark] = count + 1
                 chosen.append(sighting)
-        chosen.reverse()
+        chosen.sort(key=lambda sighting: sighting.stamp)
         return chosen
 
     def _attempt(self, stamp: float, chosen: list[RangeBearing]) -> Fix | None:
@@ -112,13 +110,7 @@ class FixSearch:
                 reason = "The landmarks seen so far wait for a second sighting."
                 self.refusal = FixRefusal(reason, "one_landmark", tuple(sorted(counts)))
             return None
-        kept: list[RangeBearing] = []
-        mounts: list[Pose2D] = []
-        for sighting in chosen:
-            carried = self._carry(sighting, stamp)
-            if carried is not None:
-                kept.append(carried[0])
-                mounts.append(carried[1])
+        kept, mounts = self._carried(chosen, stamp)
         answer = fix(kept, self.landmarks, self.camera_forward, self.settings, mounts)
         if isinstance(answer, FixRefusal):
             self.refusal = answer
@@ -147,26 +139,35 @@ class FixSearch:
         )
         return answer
 
-    def _carry(self, sighting: RangeBearing, stamp: float) -> tuple[RangeBearing, Pose2D] | None:
-        """The sighting with honest errors, and where the camera was, seen from now."""
+    def _carried(
+        self, chosen: list[RangeBearing], stamp: float
+    ) -> tuple[list[RangeBearing], list[Pose2D]]:
+        """Sightings with honest errors, and where the camera was, seen from now; oldest first."""
         camera = Pose2D(self.camera_forward, 0.0, 0.0)
-        way, _ = self.history.moved(sighting.stamp, stamp)
-        if way == 0.0:
-            return sighting, camera
-        if way > _LONGEST_WAY:
-            return None
-        then = self.history.advance(
-            Pose2D(0.0, 0.0, 0.0), stamp, sighting.stamp, self.scale, self.offset
-        )
-        turned = 0.03 * way + 0.01 * math.sqrt(way)
-        shifted = 0.04 * way + turned * way
-        return (
-            replace(
-                sighting,
-                range_sigma=float(np.hypot(sighting.range_sigma, shifted)),
-                bearing_sigma=float(
-                    np.hypot(sighting.bearing_sigma, turned + shifted / max(sighting.range, 0.5))
-                ),
-            ),
-            then.compose(camera),
-        )
+        kept: list[RangeBearing] = []
+        mounts: list[Pose2D] = []
+        then, way, later = Pose2D(0.0, 0.0, 0.0), 0.0, stamp
+        for sighting in reversed(chosen):
+            if sighting.stamp < later:
+                driven, piece = self.history.driven(sighting.stamp, later, self.scale, self.offset)
+                if piece:
+                    then, way = then.compose(driven.inverse()), way + piece
+                later = sighting.stamp
+            if way > _LONGEST_WAY:
+                break
+            kept.append(_vaguer(sighting, way) if way else sighting)
+            mounts.append(then.compose(camera))
+        return kept[::-1], mounts[::-1]
+
+
+def _vaguer(sighting: RangeBearing, way: float) -> RangeBearing:
+    """The sighting with the errors of dead reckoning over ``way`` metres since."""
+    turned = 0.03 * way + 0.01 * math.sqrt(way)
+    shifted = 0.04 * way + turned * way
+    return replace(
+        sighting,
+        range_sigma=math.hypot(sighting.range_sigma, shifted),
+        bearing_sigma=math.hypot(
+            sighting.bearing_sigma, turned + shifted / max(sighting.range, 0.5)
+        ),
+    )

@@ -6,13 +6,15 @@ each of the two. Until third landmarks that agree have ruled them out, they are 
 covariance, and what contradicts the pose is not forgotten. A third one that stands near the pivot
 hardly moves when the pose is turned round it: it rules out the other supposition alone.
 
-Where such poses fail again and again, one moved landmark is no explanation any more.
+No driving can tell them from the right pose: both landmarks together stand to the robot as they
+should, and move past it as they should. So such a pose is never claimed without saying so. Where
+such poses fail again and again, one moved landmark is no explanation any more.
 """
 
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -28,8 +30,8 @@ _MOST = 200
 _OR_ELSE = ", or this is not the map of this place"
 _TELLING = 0.5
 """A third landmark that would appear this share of the shift off its place would not agree."""
-_PATIENCE = 2
-"""After so many failed poses two landmarks give none any more."""
+_PATIENCE, _REMEMBERED = 2, 300.0
+"""After so many failed poses within so many seconds two landmarks give none any more."""
 
 
 @dataclass(slots=True)
@@ -47,8 +49,8 @@ class Trial:
     """Sightings of the two."""
     failed: bool = False
     """Others have contradicted the last one."""
-    failures: int = 0
-    """So many have been given up for that since one was confirmed."""
+    failures: deque[float] = field(default_factory=lambda: deque(maxlen=10))
+    """When poses have been given up for that since one was confirmed."""
     pivots: set[int] = field(default_factory=set)
     """Round which of the two the pose may still be turned."""
 
@@ -56,15 +58,31 @@ class Trial:
     def over(self) -> bool:
         return len(self.fixed_by) != 2
 
-    @property
-    def refusal(self) -> str:
+    def refusal(self, stamp: float) -> str:
         """Why two landmarks are to give no pose, for a person; empty where they may."""
-        if self.failures < _PATIENCE:
+        failures = sum(stamp - then < _REMEMBERED for then in self.failures)
+        if failures < _PATIENCE:
             return ""
         return (
-            f"Poses of two landmarks have failed {self.failures} times: three have to agree"
-            f"{_OR_ELSE}."
+            f"Poses of two landmarks have failed {failures} times: three have to agree{_OR_ELSE}."
         )
+
+    def forgive(self) -> None:
+        """Somebody wants to begin anew: what has failed before says nothing any more."""
+        self.failures.clear()
+
+    @property
+    def unconfirmed(self) -> str:
+        """Why the pose is not to be claimed without a word, for a person; empty where it is."""
+        if self.over:
+            return ""
+        one, other = sorted(self.fixed_by)
+        if len(self.landmarks) < 3:
+            return (
+                f"The map has landmarks {one} and {other} only: if one of them has been moved "
+                "round the other, nothing would tell."
+            )
+        return f"Only landmarks {one} and {other} have agreed so far: a third one has to."
 
     @property
     def undecided(self) -> bool:
@@ -76,7 +94,7 @@ class Trial:
         self.fixed_by = frozenset(fixed_by)
         self.pivots = set() if self.over else set(fixed_by)
         if self.over:
-            self.failures = 0
+            self.failures.clear()
         self.against.clear()
         self.led[:] = () if self.over else used
         self.failed = False
@@ -88,7 +106,8 @@ class Trial:
         """
         evidence = [*self.against, *(self.led if self.failed else ())]
         self.failed = self.failed and bool(evidence)
-        self.failures += self.failed
+        if self.failed:
+            self.failures.append(max(one.stamp for one in evidence))
         self.fixed_by = frozenset()
         self.against.clear()
         self.led.clear()

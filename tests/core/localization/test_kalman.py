@@ -260,3 +260,52 @@ def test_a_measurement_costs_less_than_100_microseconds() -> None:
         durations.append(time.perf_counter() - begin)
     # Some 40 microseconds alone on a core; others may be using it too.
     assert float(np.percentile(durations, 10)) < 100e-6
+
+
+def far(stamp: float, number: int) -> tuple[RangeBearing, Landmark]:
+    """One of many landmarks on a circle round the robot, exactly where the map has it."""
+    angle = 0.3 * number
+    mark = Landmark(number, 3.0 * math.cos(angle), 3.0 * math.sin(angle))
+    bearing = wrap_angle(angle)
+    return RangeBearing(stamp, number, 3.0, bearing, 0.01, 0.002, 0.0), mark
+
+
+def test_places_in_the_state_go_to_those_seen_last() -> None:
+    """With fewer places than landmarks no landmark's error counts as fresh noise."""
+    tracked = PoseFilter(0.2, 0.0, surveyed=(1, 2, 3), shared=True)
+    tracked.reset(Pose2D(0.0, 0.0, 0.0), np.diag([0.01, 0.01, 0.01]))
+    sigma = tracked.noise.survey_sigma
+    for number in (5, 6, 5, 6, 7, 5, 6):
+        tracked.take(*far(0.0, number), 0.2)
+    copied = tracked.copy()
+    before = tracked.covariance.copy()
+    # Three stand still in the picture: for hours it would be the map that limits what is known.
+    for _ in range(2000):
+        for number in (5, 6, 7):
+            tracked.take(*far(0.0, number), 0.2)
+    spread = math.sqrt(float(np.linalg.eigvalsh(tracked.pose_covariance[:2, :2])[0]))
+    assert spread > 0.5 * sigma / math.sqrt(3)
+    # A fourth takes the place of the one that was not seen for longest.
+    tracked.take(*far(0.0, 8), 0.2)
+    assert set(tracked.covariance.diagonal()[STATES:].tolist()) != {sigma**2}
+    shape = tracked.state.shape
+    # The copy is as it was.
+    assert np.array_equal(copied.covariance, before)
+    for number in range(1, 16):
+        tracked.take(*far(0.0, number), 0.2)
+    assert tracked.state.shape == shape
+    assert np.linalg.eigvalsh(tracked.covariance).min() > 0.0
+
+
+def test_a_landmark_beyond_the_places_is_as_one_that_has_its_own() -> None:
+    """Sixteen places or not: standing before three landmarks gives the same pose."""
+    poses = []
+    for surveyed, shared in (((1, 2, 3), False), ((11, 12, 13), True)):
+        tracked = PoseFilter(0.2, 0.0, surveyed=surveyed, shared=shared)
+        tracked.reset(Pose2D(0.02, -0.01, 0.01), np.diag([0.01, 0.01, 0.01]))
+        for _ in range(50):
+            for number in (1, 2, 3):
+                tracked.take(*far(0.0, number), 0.2)
+        poses.append((np.array(tracked.pose), tracked.pose_covariance))
+    assert poses[0][0] == pytest.approx(poses[1][0], abs=1e-9)
+    assert poses[0][1] == pytest.approx(poses[1][1], abs=1e-12)

@@ -266,7 +266,8 @@ def test_the_innovation_beyond_tolerance_needs_witnesses() -> None:
     assert "moved" in localizer.reason
     # What contradicted the old pose makes the new one.
     localizer.refix("again")
-    assert localizer.status is Status.TRACKING
+    assert localizer.status is Status.DEGRADED
+    assert localizer.reason.startswith("Only landmarks 2 and 3 have agreed so far")
     estimate = localizer.estimate(1.4)
     assert estimate is not None
     assert estimate.pose.distance_to((1.0 - FORWARD, 0.0)) < 0.02

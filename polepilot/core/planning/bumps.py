@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,7 @@ from shapely import LineString, Polygon
 from polepilot.core.plan import PlanPart
 from polepilot.core.planning.patches import patches_of, pieces_of, standing_place, strip_of
 from polepilot.core.planning.space import FreeSpace
-from polepilot.core.planning.swept import few_corners, swept_pieces
+from polepilot.core.planning.swept import few_corners
 from polepilot.core.planning.target import CHORD, Target
 
 Points = NDArray[np.float64]
@@ -34,6 +34,11 @@ _RISE = 0.9
 """From how far away such steps sweep the whole strip, as a share of the tool's radius."""
 _ROUND = 8
 """Segments per quarter turn of a capsule."""
+_STEP = 0.125
+_DEPTHS = 16
+_TURN = 0.25
+"""What a tool sweeps is looked at in pieces: so long, as a share of its radius; so many from its
+rim to its middle, the thinnest at the rim; at corners in sectors of this angle."""
 _FAR = 8.0
 """Bumps farther from each other than this, in the tool's radii, do not know of each other."""
 _LONGEST = 250.0
@@ -69,13 +74,15 @@ def with_bumps(
     smallest: float,
     enough: float = 0.0,
     whole_parts: bool = False,
+    missed: shapely.Geometry | None = None,
 ) -> tuple[Points, tuple[PlanPart, ...]]:
     """The path with bumps to those patches that it misses and that are larger than ``smallest`` m².
 
+    ``missed``: what that is, if it is known already.
     ``enough``: the smallest ones are left if all of them together make up no more, m².
     ``whole_parts``: the ends of parts stay where they are.
     """
-    patches = patches_of(target.missed(path), smallest)
+    patches = patches_of(target.missed(path) if missed is None else missed, smallest)
     for _ in range(2):  # the second time for what bumps themselves have missed
         left = sum(float(patch.area) for patch in patches)
         if left <= enough:
@@ -104,7 +111,11 @@ class _Bump:
     """The places between."""
     line: LineString
     """Through all of them."""
-    swept: shapely.Geometry
+
+    @property
+    def legs(self) -> Points:
+        """M x 4: the ends of its straight lines."""
+        return _legs(shapely.get_coordinates(self.line))
 
 
 class _Bumped:
@@ -122,9 +133,8 @@ class _Bumped:
         # For what it sweeps the path is taken with fewer chords.
         few = few_corners(path, CHORD) if len(path) > 2 else np.arange(len(path))
         self._few, self._few_marks = path[few], self._marks[few]
-        pairs = np.stack([self._few[:-1], self._few[1:]], axis=1)
-        self._few_tree = shapely.STRtree(shapely.linestrings(pairs))
-        self._pieces = swept_pieces(self._few, self._radius, _ROUND)
+        self._few_legs = _legs(self._few)
+        self._few_tree = shapely.STRtree(shapely.linestrings(self._few_legs.reshape(-1, 2, 2)))
         self._bumps: list[_Bump] = []
         self._begins: list[float] = []
         """Where they begin, in order, as lengths along the path; and the same where they end."""
@@ -149,7 +159,8 @@ class _Bumped:
 
     def left(self, patches: list[Polygon], smallest: float) -> list[Polygon]:
         """What bumps leave of some patches, each at least ``smallest`` m²."""
-        swept = np.array([bump.swept for bump in self._bumps], dtype=object)
+        lines = np.array([bump.line for bump in self._bumps], dtype=object)
+        swept = shapely.buffer(lines, self._radius, quad_segs=_ROUND)
         rest = np.array(patches, dtype=object)
         of, bumps = shapely.STRtree(swept).query(rest, predicate="intersects")
         for patch in np.unique(of).tolist():
@@ -253,64 +264,63 @@ class _Bumped:
             return False
         most = losses * _LOSS * (self._radius / 0.2) ** 2
         line = LineString(new)
-        swept = line.buffer(self._radius, quad_segs=_ROUND)
-        if last - first > 1e-9 and self._loses(new, swept, first, last, most):
+        if last - first > 1e-9 and self._loses(new, first, last, most):
             return False
-        self._put(_Bump(first, last, tips, line, swept))
+        self._put(_Bump(first, last, tips, line))
         return True
 
-    def _loses(
-        self, new: Points, swept: shapely.Geometry, first: float, last: float, most: float
-    ) -> bool:
-        """Whether more than ``most`` m² are swept no more if the path goes along ``new``, which
-        sweeps ``swept``, from ``first`` to ``last``."""
+    def _loses(self, new: Points, first: float, last: float, most: float) -> bool:
+        """Whether more than ``most`` m² are swept no more if the path goes along ``new`` from
+        ``first`` to ``last``; by looking at many small pieces of what was swept."""
         begin, end = np.searchsorted(self._few_marks, [first + 1e-9, last - 1e-9])
-        old = LineString(np.vstack([new[0], self._few[begin:end], new[-1]]))
-        lost = old.buffer(self._radius, quad_segs=_ROUND).difference(swept)
-        if lost.area <= most:
+        old = np.vstack([new[0], self._few[begin:end], new[-1]])
+        spots, sizes = _pieces_along(old, self._radius)
+        lost = _away(spots, _legs(new), self._radius)
+        if sizes[lost].sum() <= most:
             return False
-        mine = self._near(*new[1].tolist())
-        gone = [(first, last), *((bump.first, bump.last) for bump in mine)]
-        near = self._few_tree.query(lost, predicate="dwithin", distance=self._radius)
-        begins, ends = self._few_marks[near], self._few_marks[near + 1]
-        cut = np.zeros(len(near), dtype=bool)
-        for start, end in gone:
-            cut |= (begins < end) & (start < ends)
-        rest = [part for index in near[cut].tolist() for part in self._kept(index, gone)]
-        around = np.concatenate(
-            [
-                np.array([bump.swept for bump in mine], dtype=object),
-                self._pieces[near[~cut]],
-                self._capsules(rest) if rest else np.zeros(0, dtype=object),
-            ]
-        )
-        shapely.prepare(lost)
-        around = around[shapely.intersects(lost, around)]
-        low, high = np.hsplit(shapely.bounds(around) - np.tile(lost.centroid.coords[0], 2), 2)
-        for index in np.argsort(np.hypot(*(low + high).T)).tolist():
-            lost = lost.difference(around[index])
-            if lost.area <= most:
-                return False
-        return self._target.area_in(lost) > most
+        spots, sizes = spots[lost], sizes[lost]
+        lost = _away(spots, self._legs_around(spots, first, last), self._radius)
+        if sizes[lost].sum() <= most:
+            return False
+        return bool(sizes[lost][self._target.holds(spots[lost])].sum() > most)
 
-    def _capsules(self, lines: list[Points]) -> Shapes:
-        """What is swept along straight lines, each on its own."""
-        ends = shapely.linestrings(np.array(lines))
-        return np.asarray(shapely.buffer(ends, self._radius, quad_segs=_ROUND))
+    def _legs_around(self, spots: Points, first: float, last: float) -> Points:
+        """M x 4: straight lines from which the tool may sweep one of the spots, if the path is not
+        driven from ``first`` to ``last``; with bumps instead of what they replace."""
+        low, high = spots.min(axis=0) - self._radius, spots.max(axis=0) + self._radius
+        whole: list[int] = []
+        kept: list[Points] = []
+        for index in self._few_tree.query(shapely.box(*low, *high)).tolist():
+            begin, end = float(self._few_marks[index]), float(self._few_marks[index + 1])
+            at = bisect_right(self._ends, begin)
+            if not (begin < last and first < end) and not (
+                at < len(self._begins) and self._begins[at] < end
+            ):
+                whole.append(index)
+                continue
+            stops = [(first, last)]
+            while at < len(self._begins) and self._begins[at] < end:
+                stops.append((self._begins[at], self._ends[at]))
+                at += 1
+            for stop, go in sorted(stops):
+                if begin < min(stop, end):
+                    kept.append(self._part(index, begin, min(stop, end)))
+                begin = max(begin, go)
+            if begin < end:
+                kept.append(self._part(index, begin, end))
+        x, y = ((low + high) / 2).tolist()
+        for bump in self._near(x, y):
+            x0, y0, x1, y1 = bump.line.bounds
+            if x0 < high[0] and x1 > low[0] and y0 < high[1] and y1 > low[1]:
+                kept.append(bump.legs)
+        return np.vstack([self._few_legs[whole], *kept])
 
-    def _kept(self, index: int, gone: list[tuple[float, float]]) -> list[Points]:
-        """What is left of a segment of the path without some stretches of it."""
-        spans = [(float(self._few_marks[index]), float(self._few_marks[index + 1]))]
-        for first, last in gone:
-            cut: list[tuple[float, float]] = []
-            for a, b in spans:
-                if first < b and a < last:
-                    cut += [(a, first)] if first - a > 1e-9 else []
-                    cut += [(last, b)] if b - last > 1e-9 else []
-                else:
-                    cut.append((a, b))
-            spans = cut
-        return [np.vstack([self._at(a), self._at(b)]) for a, b in spans]
+    def _part(self, index: int, begin: float, end: float) -> Points:
+        """1 x 4: a part of a leg with few corners, between lengths along the path."""
+        first, last = self._few_marks[index], self._few_marks[index + 1]
+        a, b = self._few[index], self._few[index + 1]
+        shares = (np.array([begin, end]) - first) / max(last - first, 1e-12)
+        return np.asarray((a + shares[:, None] * (b - a)).reshape(1, 4))
 
     def _at(self, mark: float) -> Points:
         index = min(max(bisect_left(self._marks, mark), 1), len(self._marks) - 1)
@@ -346,3 +356,61 @@ class _Bumped:
             if end > begin:
                 moved.append(PlanPart(part.kind, begin, end))
         return np.array(points), tuple(moved)
+
+
+def _legs(line: Points) -> Points:
+    """M x 4: where each straight piece of a line begins and ends."""
+    return np.hstack([line[:-1], line[1:]])
+
+
+def _pieces_along(line: Points, radius: float) -> tuple[Points, Points]:
+    """What a disc sweeps beside a line, in small pieces: their middles, and their areas, m²."""
+    steps = np.diff(line, axis=0)
+    lengths = np.hypot(*steps.T)
+    line, steps, lengths = line[:-1][lengths > 1e-9], steps[lengths > 1e-9], lengths[lengths > 1e-9]
+    edges = radius * (1 - np.linspace(0, 1, _DEPTHS + 1) ** 2)
+    out, thick = (edges[:-1] + edges[1:]) / 2, edges[:-1] - edges[1:]
+    counts = np.ceil(lengths / (_STEP * radius)).astype(np.intp)
+    rows = np.repeat(np.arange(len(steps)), counts)
+    place = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
+    feet = line[rows] + ((place + 0.5) / counts[rows])[:, None] * steps[rows]
+    along = steps[rows] / lengths[rows, None]
+    beside = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    wide = lengths[rows] / counts[rows]
+    headings = np.arctan2(steps[:, 1], steps[:, 0])
+    turns = (np.diff(headings) + math.pi) % math.tau - math.pi
+    counts = np.ceil(np.abs(turns) / _TURN).astype(np.intp)
+    rows = np.repeat(np.arange(len(turns)), counts)
+    place = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
+    turn = turns[rows] / counts[rows]
+    across = headings[rows] + (place + 0.5) * turn - np.copysign(math.pi / 2, turn)
+    corner = np.stack([np.cos(across), np.sin(across)], axis=1)
+    spots = np.concatenate(
+        [
+            feet[:, None] + side[:, None] * out[:, None]
+            for feet, side in (
+                (feet, beside),
+                (feet, -beside),
+                (line[rows + 1], corner),
+            )
+        ]
+    )
+    sizes = np.concatenate([*[wide[:, None] * thick] * 2, np.abs(turn)[:, None] * out * thick])
+    spots = spots.reshape(-1, 2)
+    if len(steps) == 1:
+        return spots, sizes.ravel()
+    # On the inner side of a corner a spot belongs to the leg that is nearest to it.
+    depths = np.broadcast_to(out - 1e-6, sizes.shape).ravel()
+    own = _away(spots, np.hstack([line, line + steps]), depths)
+    return spots[own], sizes.ravel()[own]
+
+
+def _away(spots: Points, legs: Points, radius: float | Points) -> NDArray[np.bool_]:
+    """Which of N x 2 spots are farther than ``radius``, of all or of each, from all straight lines,
+    M x 4."""
+    steps = legs[:, 2:] - legs[:, :2]
+    squared = np.maximum((steps**2).sum(axis=1), 1e-18)
+    out = spots[:, None] - legs[:, :2]
+    share = np.clip((out * steps).sum(axis=2) / squared, 0.0, 1.0)
+    out -= share[..., None] * steps
+    return np.asarray((out**2).sum(axis=2).min(axis=1, initial=np.inf) > np.square(radius))

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely import LineString, Point
 
 from polepilot.core import geometry
@@ -220,15 +221,21 @@ def _stops(
         if sides[index] > 2 * way.gap or not spots:
             spots += [marks[index] + share * sides[index] for share in (0.5, 0.3, 0.7, 0.15, 0.85)]
     lengths = (np.array(spots) - entry.first) % length
+    corners = np.asarray(line.coords, dtype=float)[:, :2]
+
+    def ends(at: Points) -> NDArray[np.object_]:
+        """2 x N places, so far along the stroke and a gap farther."""
+        along = (entry.first + at + np.array([[0.0], [way.gap]])) % length
+        x, y = (np.interp(along, marks, values) for values in corners.T)
+        return np.asarray(shapely.points(x, y))
+
+    common = ends(lengths)
     taken: list[tuple[float, _Node]] = []
     for child in sorted(children, key=lambda c: -c.weight):
         own = float(line.project(Point(shapely.shortest_line(line, child.line).coords[0])))
         choices = np.r_[lengths, (own - entry.first) % length]
-        ends = [
-            shapely.line_interpolate_point(line, (entry.first + choices + more) % length)
-            for more in (0.0, way.gap)
-        ]
-        cost = sum(shapely.distance(end, child.line) for end in ends)
+        places = np.hstack([common, ends(choices[-1:])])
+        cost = shapely.distance(places, child.line).sum(axis=0)
         cost = np.round(cost, 3) + 2.0 * ((choices < way.gap) | (choices > span - 2 * way.gap))
         for at, _ in taken:
             cost = cost + 2.0 * (np.abs(choices - at) < 2 * way.gap)

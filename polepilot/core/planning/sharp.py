@@ -65,13 +65,14 @@ def sharp_path(
     corners = len(few_corners(path))
     if options.order == "paper" or corners > _MOST_CORNERS:
         return _with_bumps(path, parts, space, options, target)
-    strip = _longest_strip(target.missed(path), tool)
+    missed = target.missed(path)
+    strip = _longest_strip(missed, tool)
     if strip is None:
-        return _with_bumps(path, parts, space, options, target)
+        return _with_bumps(path, parts, space, options, target, missed)
     # The longest strip that loops leave is driven once, and nothing leads back from there.
     passes = cleanup_strokes(strip, tool, space, smallest)
     if not passes:
-        return _with_bumps(path, parts, space, options, target)
+        return _with_bumps(path, parts, space, options, target, missed)
     end = (float(path[-1, 0]), float(path[-1, 1]))
     longer = _joined_runs(chained(passes, end), space, options, [], path, parts)
     longer = trimmed(*longer, target, 3 * smallest)
@@ -82,7 +83,7 @@ def sharp_path(
     if more < _ABOUT * bumpy:
         found.append(_with_bumps(*longer, space, options, target))
     if not found or (more > bumpy / _ABOUT and tried):
-        found.append(_with_bumps(path, parts, space, options, target))
+        found.append(_with_bumps(path, parts, space, options, target, missed))
     return min(found, key=lambda way: path_cost(way[0], target))
 
 
@@ -97,8 +98,9 @@ def _with_bumps(
     space: FreeSpace,
     options: PlanOptions,
     target: Target,
+    missed: shapely.Geometry | None = None,
 ) -> tuple[Points, tuple[PlanPart, ...]]:
-    """The path with bumps to what it misses."""
+    """The path with bumps to what it misses, if that is known already ``missed``."""
     return with_bumps(
         path,
         parts,
@@ -107,6 +109,7 @@ def _with_bumps(
         min(_LEAST * target.tool**2, _SHARE * target.area),
         (_TRIFLE if len(few_corners(path)) < _MOST_CORNERS else _LITTLE) * target.area,
         options.order == "paper",
+        missed,
     )
 
 

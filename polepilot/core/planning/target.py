@@ -24,7 +24,7 @@ CHORD = 0.001
 _TILE = 10.0
 """Side of a tile in tool widths, at most; more where the area is kilometres long."""
 _GRID = 1e-6
-"""Corners of what is left of a tile lie on a grid so fine that neighbours fit, metres."""
+"""Corners of what is left at the edge of a tile lie on a grid so fine that neighbours fit, m."""
 _SAME = 1e-6
 """Bands whose keys differ by less than this are the same."""
 _MOST_TILES = 1000
@@ -43,6 +43,7 @@ class Target:
         x0, y0, x1, y1 = area.bounds
         side = max(_TILE * tool, (x1 - x0 + y1 - y0) / _MOST_TILES)
         self._tiles = np.array(_tiles(area, side), dtype=object)
+        shapely.prepare(self._tiles)
         self._low, self._high = np.hsplit(shapely.bounds(self._tiles).reshape(-1, 4), 2)
         grow = tool / 2 + 1e-6
         boxes = shapely.box(*(self._low - grow).T, *(self._high + grow).T)
@@ -58,7 +59,8 @@ class Target:
         inside = ((low > self._low[tiles] + _GRID) & (high < self._high[tiles] - _GRID)).all(axis=1)
         areal = shapely.get_type_id(parts) == _POLYGON
         # What lies at the edge of a tile may go on in the next one.
-        joined = shapely.disjoint_subset_union_all(parts[areal & ~inside])
+        edges = shapely.set_precision(parts[areal & ~inside], _GRID)
+        joined = shapely.disjoint_subset_union_all(edges)
         return MultiPolygon([*parts[areal & inside].tolist(), *polygons(joined)])
 
     def missed_area(self, *lines: Points) -> float:
@@ -69,6 +71,13 @@ class Target:
         """How much of the area a shape holds, m²."""
         near = self._tiles[self._tree.query(shape, predicate="intersects")]
         return float(shapely.area(shapely.intersection(near, shape)).sum())
+
+    def holds(self, points: Points) -> NDArray[np.bool_]:
+        """Which of N x 2 points are in the area."""
+        inside = np.zeros(len(points), dtype=bool)
+        for tile in self._tree.query(shapely.multipoints(points)).tolist():
+            inside |= shapely.intersects_xy(self._tiles[tile], *points.T)
+        return inside
 
     def _left(self, lines: tuple[Points, ...]) -> NDArray[np.object_]:
         """What the lines leave of each tile."""
@@ -92,11 +101,10 @@ class Target:
         """A tile without what is swept by some bands."""
         try:
             swept = shapely.union_all(bands.shapes[near])
-            left = shapely.difference(self._tiles[tile], swept)
+            return shapely.difference(self._tiles[tile], swept)
         except shapely.GEOSException:  # corners nearly coincide; whole capsules have none in common
             swept = shapely.union_all(bands.capsules(near, self._round))
-            left = shapely.difference(self._tiles[tile], swept)
-        return shapely.set_precision(left, _GRID)
+            return shapely.difference(self._tiles[tile], swept)
 
 
 def _tiles(shape: shapely.Geometry, side: float) -> list[shapely.Geometry]:

@@ -9,6 +9,7 @@ from core.planning import maps
 from shapely import MultiPolygon
 
 from polepilot.core.plan import PlanPart
+from polepilot.core.planning import bumps
 from polepilot.core.planning.bumps import with_bumps
 from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.space import free_space
@@ -60,3 +61,14 @@ def test_nothing_missed_nothing_changed() -> None:
 
 def _length(points: np.ndarray) -> float:
     return float(np.hypot(*np.diff(points, axis=0).T).sum())
+
+
+@pytest.mark.parametrize("tip", [0.02, 0.1, 0.3])
+@pytest.mark.parametrize("corner", [[], [[0.15, 0.0]], [[0.15, 0.1]]])
+def test_what_a_bump_no_longer_sweeps_is_measured(tip: float, corner: list[list[float]]) -> None:
+    old = np.array([[0.0, 0.0], *corner, [0.3, 0.0 if not corner else 0.15]])
+    new = np.array([old[0], [0.15, -tip], old[-1]])
+    spots, sizes = bumps._pieces_along(old, TOOL / 2)
+    found = sizes[bumps._away(spots, bumps._legs(new), TOOL / 2)].sum()
+    discs = [shapely.LineString(line).buffer(TOOL / 2, quad_segs=64) for line in (old, new)]
+    assert found == pytest.approx(discs[0].difference(discs[1]).area, rel=0.15, abs=3e-4)

@@ -58,3 +58,10 @@ def test_how_much_of_it_a_shape_holds() -> None:
     shape = shapely.box(3, -1, 10, 2)
     expected = AREA.intersection(shape).area
     assert Target(AREA, TOOL).area_in(shape) == pytest.approx(expected)
+
+
+def test_which_points_an_area_holds() -> None:
+    area = MultiPolygon([shapely.box(0, 0, 9, 5).difference(shapely.box(3, 1, 4, 2))])
+    points = np.random.default_rng(4).uniform(-1, 10, (500, 2))
+    found = Target(area, 0.4).holds(points)
+    assert np.array_equal(found, shapely.intersects_xy(area, *points.T))

@@ -17,6 +17,7 @@ from polepilot.core.plan import Plan, PlanPart
 from polepilot.core.planning.bumps import long_for_bumps
 from polepilot.core.planning.driven import driven_path
 from polepilot.core.planning.groups import regions_of
+from polepilot.core.planning.leftover import stretches_over
 from polepilot.core.planning.offset import (
     OVERLAP,
     Points,
@@ -67,8 +68,6 @@ _LONG = 3.0
 others are visited from the path."""
 _BROAD = 0.36
 """Bumps do not sweep patches that are broader than twice this share of the tool's width."""
-_RAGGED = 0.1
-"""How exactly the outlines of patches are followed, in tool widths."""
 _MANY = 24
 _LARGE = 5000.0
 """Up to so many squares of the tool several spacings are tried."""
@@ -253,30 +252,38 @@ def _strokes(
     whole: bool,
     spacings: tuple[float, ...],
 ) -> list[Stroke]:
-    """Loops and clean-up passes for ``target``; for patches only passes and what loops cross it."""
+    """Loops and clean-up passes for ``target``; for patches passes, and stretches of loops."""
     tool = options.tool_width
     smallest = _SMALLEST * (tool / 0.4) ** 2
     plain = options.min_turn_radius <= 0
     tolerance = min(0.002, 0.01 * tool) if plain else min(0.02, 0.05 * tool)
-    if not whole:
-        loops = _patch_strokes(pieces, target.shape, tool, tolerance)
-        return _completed(loops, space, target, smallest, _always if plain else _long)
-    if options.order == "paper":
+    if options.order == "paper" and whole:
         pieces = [region for piece in pieces for region in regions_of(piece, tool)]
     passed = (_broad if tool / 2 > space.clearance + MARGIN else long_for_bumps) if plain else _long
+    # Each clean-up pass has to be gone to and left again.
+    extra = 2 * tool * (1 + (options.min_turn_radius > 0))
+    overlap = _TOUCH if plain else OVERLAP
+    if not whole:
+        every = (nested_loops(pieces, tool, tolerance, closer, overlap) for closer in spacings)
+        ways = [stretches_over(loops, target.shape, tool) for loops in every]
+        loops = min(ways, key=lambda strokes: _cost(strokes, extra))
+        return _completed(loops, space, target, smallest, _always if plain else _long)
     best: list[Stroke] = []
     least = math.inf
     for closer in spacings:
-        loops = nested_loops(pieces, tool, tolerance, closer, _TOUCH if plain else OVERLAP)
+        loops = nested_loops(pieces, tool, tolerance, closer, overlap)
         strokes = _completed(loops, space, target, smallest, passed)
-        # Each clean-up pass has to be gone to and left again.
-        extra = 2 * tool * (1 + (options.min_turn_radius > 0))
-        cost = sum(s.line.length + (0.0 if s.closed else extra) for s in strokes)
+        cost = _cost(strokes, extra)
         if strokes and cost < least:
             best, least = strokes, cost
         if len(loops) > _MANY or target.area > _LARGE * tool**2:
             break  # on a large map the spacing matters less than the time to think about it
     return best
+
+
+def _cost(strokes: list[Stroke], extra: float) -> float:
+    """Their length, and ``extra`` metres for each that is no loop."""
+    return sum(float(s.line.length) + (0.0 if s.closed else extra) for s in strokes)
 
 
 def _completed(
@@ -320,26 +327,6 @@ def _broad(patch: Polygon, tool: float) -> bool:
 def _long(patch: Polygon, tool: float) -> bool:
     """Whether a wheel does better with a pass along a patch than with visits to it."""
     return bool(patch.length > 2 * _LONG * tool)
-
-
-def _patch_strokes(
-    pieces: list[Polygon], target: MultiPolygon, tool: float, tolerance: float
-) -> list[Stroke]:
-    """Loops inside of the larger patches; the narrow ones are left to clean-up passes."""
-    strokes: list[Stroke] = []
-    room = shapely.union_all(pieces)
-    for patch in target.geoms:
-        if patch.buffer(-0.55 * tool).is_empty:
-            continue
-        inner = patch.buffer(-0.4 * tool, join_style="mitre", mitre_limit=1.5)
-        inner = inner.simplify(_RAGGED * tool)
-        spots = [
-            part
-            for part in shapely.get_parts(inner.intersection(room)).tolist()
-            if isinstance(part, Polygon) and part.area > 1e-3
-        ]
-        strokes += nested_loops(spots, tool, tolerance)
-    return strokes
 
 
 def _path(

@@ -16,6 +16,10 @@ from numpy.typing import NDArray
 
 from polepilot.core.errors import InternalError
 
+_TREMBLE = 1000.0
+"""Outlines whose corners turn by more than this in all are taken off in steps, radians."""
+_STEPS = (0.025, 0.125)
+"""The first of those steps, as shares of the whole."""
 _SHARP = 0.35
 """Outlines are cut where they turn by more than this, radians."""
 _MOST_TURN = 1.4
@@ -54,7 +58,9 @@ class Footprint:
     ) -> shapely.Geometry:
         """Where `base_link` may be on ``floor`` so that neither its edge nor ``things`` (lines,
         points) are touched."""
-        free = floor.buffer(-self.radius, quad_segs=self.quadrant)
+        calm, rest = calmed(floor, self.radius, self.chord / 2)
+        disc = self if rest == self.radius else Footprint(rest, self.chord / 2)
+        free = calm.buffer(-rest, quad_segs=disc.quadrant)
         if not things:
             return free
         around = shapely.buffer(np.array(things), self.radius, quad_segs=self.quadrant)
@@ -69,12 +75,32 @@ class Footprint:
         return shapely.union_all([places, *around])
 
 
+def calmed(floor: shapely.Geometry, radius: float, chord: float) -> tuple[shapely.Geometry, float]:
+    """A floor less a part of ``radius`` if its outline trembles, and what of it is still to be
+    taken off.
+
+    All at once that takes time by the square of how many corners are within ``radius``; what is
+    left of them after a few millimetres is calm. ``chord``: how far arcs may be inside, metres.
+    """
+    rest = radius
+    if sum(_turned(rim).sum() for rim in shapely.get_parts(shapely.boundary(floor))) > _TREMBLE:
+        for share in _STEPS:
+            disc = Footprint(share * radius, chord / len(_STEPS))
+            floor = floor.buffer(-disc.radius, quad_segs=disc.quadrant)
+            rest -= disc.radius
+    return floor, rest
+
+
+def _turned(rim: shapely.LineString) -> NDArray[np.float64]:
+    """By how much a line turns at each of its inner points, radians."""
+    steps = np.diff(shapely.get_coordinates(rim), axis=0)
+    turns = np.diff(np.arctan2(steps[:, 1], steps[:, 0]))
+    return np.asarray(np.abs((turns + math.pi) % math.tau - math.pi))
+
+
 def _short_bends(rim: shapely.LineString) -> NDArray[np.object_]:
     """A line in pieces without sharp corners, each of which turns by little in all."""
-    points = shapely.get_coordinates(rim)
-    steps = np.diff(points, axis=0)
-    turns = np.diff(np.arctan2(steps[:, 1], steps[:, 0]))
-    turns = np.abs((turns + math.pi) % math.tau - math.pi)
+    points, turns = shapely.get_coordinates(rim), _turned(rim)
     sharp = turns > _SHARP
     piece = np.floor(np.cumsum(np.where(sharp, 0.0, turns)) / _MOST_TURN) + np.cumsum(sharp)
     cuts = np.r_[0, np.flatnonzero(np.diff(np.r_[0.0, piece])) + 1, len(points) - 1]

@@ -12,7 +12,9 @@ import shapely
 from numpy.typing import NDArray
 from shapely import LineString, MultiPolygon, Polygon
 
+from polepilot.core.planning.footprint import calmed
 from polepilot.core.planning.space import (
+    CHORD,
     MARGIN,
     FreeSpace,
     as_multi,
@@ -60,7 +62,8 @@ def _mitred(site: Site, space: FreeSpace) -> list[Polygon]:
     It is a part of the free space; in tight places it is less than that.
     """
     radius = space.clearance + MARGIN
-    sharp = space.floor.buffer(-radius, join_style="mitre", mitre_limit=2.0)
+    floor, rest = calmed(space.floor, radius, CHORD)
+    sharp = floor.buffer(-rest, join_style="mitre", mitre_limit=2.0)
     things = [LineString(wall) for wall in site.walls]
     if things:
         boxes = shapely.buffer(

@@ -200,6 +200,17 @@ def test_a_cover_matters_where_it_makes_one_landmark_of_another() -> None:
         assert [found.id for found in some.detect(image)] == seen, others
 
 
+@pytest.mark.parametrize("unit", [3, 4, 6, 10])
+def test_a_skirting_board_is_behind_the_pole(unit: int) -> None:
+    """As black as the paint, it crosses the pole where another id has a bright bit. It parts the wall
+    from the floor; a branch ends soon, or has the wall below it as well."""
+    for number, bit in ((12, 0), (2, 3), (5, 1)):  # 1100000101011 and so on
+        segment = 3 + 2 * bit
+        for reach, floor, seen in ((200, 120.0, [number]), (200, None, []), (3 * unit, 120.0, [])):
+            image = post(encode(number, 4), unit, unit, band=segment, reach=reach, floor=floor)
+            assert [one.id for one in ALL.detect(image)] == seen, (number, reach, floor)
+
+
 def cut(image: Image, first: int, end: int, lower: float = 0.0) -> list[Detection]:
     """What is seen in these rows of a picture, all that a camera shows; ``lower``: by how many rows
     its axis is thought to be lower."""
@@ -296,6 +307,9 @@ def post(
     board: bool = False,
     bars: bool = True,
     wall: float = 155.0,
+    band: int | None = None,
+    reach: int = 200,
+    floor: float | None = None,
 ) -> Image:
     """A painted post in front of a grey wall or an orange board.
 
@@ -304,8 +318,16 @@ def post(
         wall: how bright the wall is, about.
         longer: segments of bright paint that follow at either end.
         bars: whether the two segments at either end are painted at all.
+        band: the segment behind which a black band crosses the wall,
+        reach: to so many columns from the middle,
+        floor: and how bright the floor below it is, if there is one.
     """
     image = np.full((300, 400, 3), (wall - 5, wall, wall + 5))
+    if band is not None:
+        upper = round(150 + (band - len(code) / 2) * unit)
+        if floor is not None:
+            image[upper + unit :] = (floor - 5, floor, floor + 5)
+        image[upper : upper + unit, 200 - reach : 200 + reach] = (20.0, 20.0, 20.0)
     if board:
         image[:, 140:260] = (60.0, 135.0, 225.0)
     across = (np.arange(400) - 200.0) / (0.7 * unit)

@@ -158,6 +158,22 @@ def test_less_light_changes_nothing(share: float) -> None:
     check(found, most=1.5, usual=0.15)
 
 
+@pytest.mark.parametrize("share", [0.05, 0.02])
+def test_dark_pictures_are_made_brighter(share: float) -> None:
+    """Orange has 60 and 38 grey levels: a level more or less is a part of the edge's error."""
+    found = changes(lambda image: DETECTOR.detect(dimmed(image, share)))
+    check(found, most=3, usual=1)
+
+
+def test_a_lamp_in_the_dark_does_not_make_it_bright() -> None:
+    def lit(image: Image) -> Image:
+        out = dimmed(image, 0.02)
+        out[4:20, 8:24] = 255
+        return out
+
+    check(changes(lambda image: DETECTOR.detect(lit(image))), most=3, usual=1)
+
+
 def test_grey_pictures_may_have_an_axis_for_their_channel() -> None:
     for image in scenes()[:5]:
         grey = np.ascontiguousarray(image[..., 2])

@@ -2,6 +2,7 @@
 #include "internal.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 #define LEAST_ROWS 8           /* of a picture; no code has fewer */
 #define ATTEMPTS 2             /* the second one with the code that the first has read */
@@ -204,10 +205,10 @@ static int examine(const eye_picture *picture, const eye_task *task,
                                   &doubt);
     if (reason != EYE_READ)
         return reason;
+    int behind[EYE_MOST_SEGMENTS];
     if (eye_covered(picture, task, &upright, &scale, &side, out->code, levels, segments,
-                    scale.noise / 2))
-        return EYE_COVERED;
-    if (eye_in_front(picture, task, &upright, &scale, &side, out->code, levels, segments))
+                    scale.noise / 2, behind) ||
+        eye_in_front(picture, task, &upright, &scale, &side, out->code, levels, segments, behind))
         return EYE_COVERED;
     out->side_noise = side.noise;
     out->sides = side.sides;
@@ -257,12 +258,10 @@ static int is_within(const eye_candidate *c, const eye_strip *strip)
            c->top > strip->row - half && c->bottom < strip->row + half;
 }
 
-int32_t eye_look(const eye_picture *picture, const eye_task *task, eye_strip *strips,
-                 int32_t capacity)
+/* The strips of a picture that is bright enough; how many, or -1 where there is no memory. */
+static int look(const eye_picture *picture, const eye_task *task, eye_strip *strips, int capacity)
 {
     eye_candidate candidates[EYE_MOST_CANDIDATES];
-    if (picture->rows < LEAST_ROWS || picture->columns < 1 || capacity < 1)
-        return 0;
     int n = eye_search(picture, task, candidates);
     if (n < 0)
         return -1;
@@ -274,5 +273,20 @@ int32_t eye_look(const eye_picture *picture, const eye_task *task, eye_strip *st
         if (!known)
             strips[looked++] = look_closely(picture, task, candidates + i);
     }
+    return looked;
+}
+
+int32_t eye_look(const eye_picture *picture, const eye_task *task, eye_strip *strips,
+                 int32_t capacity)
+{
+    eye_picture brighter;
+    if (picture->rows < LEAST_ROWS || picture->columns < 1 || capacity < 1)
+        return 0;
+    int dim = eye_brighten(picture, task, &brighter);
+    if (dim < 0)
+        return -1;
+    int looked = look(dim ? &brighter : picture, task, strips, capacity);
+    if (dim)
+        free((void *)brighter.pixels);
     return looked;
 }

@@ -2,11 +2,13 @@
  *
  * One call looks at one picture and keeps nothing; any number of threads may call at the same time.
  * The steps, in their order, are one file each:
+ *   exposure.c a dim picture made brighter
  *   search.c   which columns to look at (sixteen at once: lanes.h), with
  *     runs.c     the bright runs of a column
  *     match.c    runs with the proportions of a code: near landmarks
  *     comb.c     codes too far for runs, with
  *     slide.c    codes laid along the light of a column
+ *     chroma.c   whether colour is blurred there
  *     gather.c   columns that agree
  *   upright.c  how the strip leans; its light by row, straightened, and by column
  *   scale.c    all edges of the code at once, fitted to one scale, by the model in wave.c

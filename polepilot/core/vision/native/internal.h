@@ -60,6 +60,7 @@ typedef struct {
 } eye_side;
 
 /* Each says in its file what it does; those that return a reason return one of enum eye_reason. */
+int eye_brighten(const eye_picture *picture, const eye_task *task, eye_picture *out);
 int eye_search(const eye_picture *picture, const eye_task *task, eye_candidate *found);
 int eye_straighten(const eye_picture *picture, const eye_task *task,
                    const eye_candidate *candidate, const char *code, double aspect, int sharp,
@@ -84,12 +85,12 @@ int eye_look_at_ends(const eye_picture *picture, const eye_upright *upright,
                      double levels[][EYE_LIGHTS], int segments, double *doubt);
 int eye_covered(const eye_picture *picture, const eye_task *task, const eye_upright *upright,
                 const eye_scale *scale, const eye_side *side, const char *code,
-                double levels[][EYE_LIGHTS], int segments, double noise);
+                double levels[][EYE_LIGHTS], int segments, double noise, int *behind);
 double eye_apart(const eye_picture *picture, const eye_upright *upright, const eye_scale *scale,
                  const eye_side *side, const char *code, int segments);
 int eye_in_front(const eye_picture *picture, const eye_task *task, const eye_upright *upright,
                  const eye_scale *scale, const eye_side *side, const char *code,
-                 double levels[][EYE_LIGHTS], int segments);
+                 double levels[][EYE_LIGHTS], int segments, const int *behind);
 
 /* ---- numbers ---- */
 

@@ -9,7 +9,9 @@
 
 #define TOLERANCE 0.36     /* of the distance between bright and dark */
 #define DARK_TOLERANCE 0.24
-#define OPEN_TOLERANCE 0.14
+#define OPEN_TOLERANCE 0.14 /* of bright segments where an end bar's end is not to be seen, */
+#define OPEN_SPREAD 2.0     /* and times as far as dark segments are off, more, */
+#define OPEN_WIDTH 4.6      /* of a strip that has as many columns */
 #define MOST_TOLERANCE 0.45
 #define DARKEST_SHARE 0.45 /* of the bright paint's light that black gives back (haze, glare) */
 #define THIN_SHARE 0.35    /* as much more where the strip is hardly a pixel wide */
@@ -44,7 +46,9 @@ int eye_read(const eye_task *task, double levels[][EYE_LIGHTS], int segments, in
         if (dark[c] > darkest)
             darkest = dark[c];
     }
-    int reason = EYE_READ;
+    double share[EYE_MOST_SEGMENTS], aside[EYE_MOST_SEGMENTS]; /* how bright; how far off that line */
+    double dark_off = 0;
+    int darks = 0;
     for (int i = 0; i < segments; i++) {
         double place = i / (segments - 1.0), power = 0, along = 0, sum = 0, off = 0, top = 0;
         double step[EYE_LIGHTS];
@@ -62,15 +66,25 @@ int eye_read(const eye_task *task, double levels[][EYE_LIGHTS], int segments, in
             dimmest = top;
         if (power <= 1e-7 || sum <= 0)
             return EYE_NO_CONTRAST;
-        double share = along / power;
+        share[i] = along / power;
         for (int c = from; c < to; c++) {
-            double aside = levels[i][c] - dark[c] - share * step[c];
-            off += aside * aside;
+            double rest = levels[i][c] - dark[c] - share[i] * step[c];
+            off += rest * rest;
         }
-        code[i] = share > 0.5 ? '1' : '0';
+        aside[i] = sqrt(off / power);
+        code[i] = share[i] > 0.5 ? '1' : '0';
+        if (code[i] == '0') {
+            dark_off += share[i] * share[i] + off / power;
+            darks++;
+        }
+    }
+    if (open && width > OPEN_WIDTH && darks > 0)
+        bright_room += OPEN_SPREAD * sqrt(dark_off / darks);
+    int reason = EYE_READ;
+    for (int i = 0; i < segments; i++) {
         /* Black is black everywhere on a pole; bright paint has shade and gloss. */
-        double nearest = share > 0.5 ? 1 : 0, least = nearest > 0 ? bright_room : dark_room;
-        if (fabs(share - nearest) > least || sqrt(off / power) > least)
+        double least = code[i] == '1' ? bright_room : dark_room;
+        if (fabs(share[i] - (code[i] == '1')) > least || aside[i] > least)
             reason = EYE_NEITHER;
     }
     code[segments] = '\0';

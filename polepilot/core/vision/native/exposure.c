@@ -1,0 +1,53 @@
+/* A picture taken in the dark is made brighter before it is looked at. */
+#include "internal.h"
+
+#include <stdlib.h>
+
+#define APART 8         /* rows and columns from one pixel that is asked to the next, */
+#define FEW 200         /* of which one in so many may be brighter: a lamp */
+#define BRIGHT 80       /* grey levels that others should reach */
+#define MOST_TIMES 4.0  /* what there is in the dark is mostly noise */
+
+/* The level, in the paint's brightest channel, that few pixels exceed; BRIGHT if it is that or more. */
+static int brightest(const eye_picture *p, const eye_task *task)
+{
+    int counts[BRIGHT + 1] = {0}, channel = p->channels == 3 ? task->high : 0;
+    int few = ((p->rows + APART - 1) / APART) * ((p->columns + APART - 1) / APART) / FEW;
+    for (int y = 0; y < p->rows; y += APART) {
+        const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride + channel;
+        for (int x = 0; x < p->columns; x += APART) {
+            int level = row[(ptrdiff_t)x * p->channels];
+            counts[level < BRIGHT ? level : BRIGHT]++;
+        }
+        if (counts[BRIGHT] > few) /* most pictures end here */
+            return BRIGHT;
+    }
+    int level = BRIGHT;
+    for (int more = counts[level]; more <= few && level > 1; more += counts[level])
+        level--;
+    return level;
+}
+
+/* Makes a brighter copy of a picture if it is dim: 1, and its pixels have to be freed. 0 if it is
+ * not, -1 where there is no memory. */
+int eye_brighten(const eye_picture *p, const eye_task *task, eye_picture *out)
+{
+    int level = brightest(p, task);
+    if (level >= BRIGHT)
+        return 0;
+    double times = eye_limit((double)BRIGHT / level, 1, MOST_TIMES);
+    uint8_t brighter[256];
+    for (int i = 0; i < 256; i++)
+        brighter[i] = (uint8_t)eye_limit(times * i + 0.5, 0, 255);
+    ptrdiff_t width = (ptrdiff_t)p->columns * p->channels;
+    uint8_t *pixels = malloc((size_t)(width * p->rows));
+    if (!pixels)
+        return -1;
+    *out = *p;
+    out->pixels = pixels;
+    out->stride = width;
+    for (int y = 0; y < p->rows; y++)
+        for (ptrdiff_t x = 0; x < width; x++)
+            pixels[y * width + x] = brighter[p->pixels[y * p->stride + x]];
+    return 1;
+}

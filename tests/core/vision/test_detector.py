@@ -202,8 +202,8 @@ def test_a_cover_matters_where_it_makes_one_landmark_of_another() -> None:
 
 @pytest.mark.parametrize("unit", [3, 4, 6, 10])
 def test_a_skirting_board_is_behind_the_pole(unit: int) -> None:
-    """As black as the paint, it crosses the pole where another id has a bright bit. It parts the wall
-    from the floor; a branch ends soon, or has the wall below it as well."""
+    """As black as the paint, it crosses the pole where another id has a bright bit. It parts the
+    wall from the floor; a branch ends soon, or has the wall below it as well."""
     for number, bit in ((12, 0), (2, 3), (5, 1)):  # 1100000101011 and so on
         segment = 3 + 2 * bit
         for reach, floor, seen in ((200, 120.0, [number]), (200, None, []), (3 * unit, 120.0, [])):

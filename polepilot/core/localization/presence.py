@@ -17,6 +17,8 @@ _NEARER = 1.03
 """Nearer than this times the least depth at which a landmark was seen, none is expected."""
 _FARTHER = 1.0
 """Farther than this times the distance from which it was seen, a landmark is not expected."""
+_ASIDE = 0.12
+"""Metres: a landmark that stands so near the line of sight to another one may hide it."""
 _PLACE = 0.05
 """Metres: within so much the view is the same, whatever stands in the way."""
 _SURE = 3
@@ -65,7 +67,10 @@ class Presence:
             record.place, record.missed = (math.inf, math.inf), 0
 
     def expected(self, pose: Pose2D, pan: float) -> list[int]:
-        """Landmarks that stand well inside the picture, as near as they were seen before."""
+        """Landmarks that stand well inside the picture, as near as they were seen before.
+
+        None of them stands behind another one.
+        """
         x, y = pose.ahead(self._forward)
         offsets = self._points - (x, y)
         direction = pose.heading + pan
@@ -80,7 +85,12 @@ class Presence:
             number = self._ids[index]
             distance = math.hypot(depth[index], aside[index])
             if distance < _FARTHER * self._records[number].farthest:
-                found.append(number)
+                sight = offsets[index] / distance
+                along = offsets @ sight
+                before = (along > 0.0) & (along < distance - _ASIDE)
+                across = np.abs(offsets[:, 0] * sight[1] - offsets[:, 1] * sight[0])
+                if not (before & (across < _ASIDE)).any():
+                    found.append(number)
         return found
 
     def saw(self, number: int, distance: float, off_axis: float, pose: Pose2D) -> bool:

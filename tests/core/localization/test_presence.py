@@ -80,3 +80,21 @@ def test_a_wrong_pose_takes_its_expectations_with_it() -> None:
     presence = used()
     presence.forget()
     assert presence.look(1.0, HERE, 0.0, set())[:2] == ([], 1.0)
+
+
+def test_a_landmark_behind_another_one_is_not_missed() -> None:
+    presence = used()
+    # From here landmark 3 stands on the line of sight to 1, 4 cm aside of it.
+    behind = Pose2D(-0.1, 0.3, -0.06)
+    assert presence.expected(behind, 0.0) == []
+    assert presence.expected(Pose2D(-0.1, 0.6, -0.1), 0.0) == [1]
+    reports = []
+    for index in range(400):
+        reports += presence.look(0.1 * index, behind, 0.0, set())[2]
+    assert reports == []
+    # One that stands behind it hides nothing.
+    marks = {**MARKS, 4: Landmark(4, 6.5, 0.0)}
+    other = Presence(marks, 0.1, HALF_VIEW)
+    other.saw(1, 6.0, 0.0, HERE)
+    other.saw(1, 4.9, 0.3, HERE)
+    assert other.expected(HERE, 0.0) == [1]

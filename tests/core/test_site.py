@@ -297,3 +297,16 @@ def test_any_document_is_a_sound_site_or_refused(document: Any) -> None:
     assert all(Polygon(ring).is_valid for ring in site.islands)
     again = parse_site(site.to_json(), "s")
     assert again == site
+
+
+def test_an_island_that_is_the_boundary_but_for_the_last_digits() -> None:
+    """What a program writes that scales an outline by one: the difference of the two is empty."""
+    ring = [[0.65, 3.8], [0.58986, 4.10232], [0.41861, 4.35861], [0.16232, 4.52986], [-0.14, 4.59]]
+    ring += [[-0.44232, 4.52986], [-0.69861, 4.35861], [-0.86986, 4.10232], [-0.93, 3.8]]
+    ring += [[-0.86986, 3.49768], [-0.69861, 3.24139], [-0.44232, 3.07014], [-0.14, 3.01]]
+    ring += [[0.16232, 3.07014], [0.41861, 3.24139], [0.58986, 3.49768]]
+    middle = np.array(ring).mean(axis=0)
+    island = (middle + (np.array(ring) - middle)).tolist()
+    assert not Polygon(ring).covers(Polygon(island))
+    with pytest.raises(SiteError, match="leave no floor"):
+        parse_site({"boundary": ring, "islands": [island]}, "s")

@@ -19,7 +19,7 @@ from shapely import LineString, Polygon
 
 from polepilot.core.plan import PlanPart
 from polepilot.core.planning.patches import patches_of, pieces_of, standing_place, strip_of
-from polepilot.core.planning.space import FreeSpace
+from polepilot.core.planning.space import FreeSpace, polygons
 from polepilot.core.planning.swept import few_corners
 from polepilot.core.planning.target import CHORD, Target
 
@@ -39,6 +39,10 @@ _DEPTHS = 16
 _TURN = 0.25
 """What a tool sweeps is looked at in pieces: so long, as a share of its radius; so many from its
 rim to its middle, the thinnest at the rim; at corners in sectors of this angle."""
+_EDGES = 1 - np.linspace(0, 1, _DEPTHS + 1) ** 2
+_OUT, _THICK = (_EDGES[:-1] + _EDGES[1:]) / 2, _EDGES[:-1] - _EDGES[1:]
+_SHARP = 0.35
+"""Where a path turns by less, what its inner side has twice does not matter, radians."""
 _FAR = 8.0
 """Bumps farther from each other than this, in the tool's radii, do not know of each other."""
 _LONGEST = 250.0
@@ -75,14 +79,17 @@ def with_bumps(
     enough: float = 0.0,
     whole_parts: bool = False,
     missed: shapely.Geometry | None = None,
-) -> tuple[Points, tuple[PlanPart, ...]]:
-    """The path with bumps to those patches that it misses and that are larger than ``smallest`` m².
+) -> tuple[Points, tuple[PlanPart, ...], float]:
+    """The path with bumps to those patches that it misses and that are larger than ``smallest`` m²;
+    and about how much it misses then, m².
 
     ``missed``: what that is, if it is known already.
     ``enough``: the smallest ones are left if all of them together make up no more, m².
     ``whole_parts``: the ends of parts stay where they are.
     """
-    patches = patches_of(target.missed(path) if missed is None else missed, smallest)
+    missed = target.missed(path) if missed is None else missed
+    rest, lost = np.array(polygons(missed), dtype=object), 0.0
+    patches = patches_of(missed, smallest)
     for _ in range(2):  # the second time for what bumps themselves have missed
         left = sum(float(patch.area) for patch in patches)
         if left <= enough:
@@ -96,8 +103,10 @@ def with_bumps(
             bumped.reach(patch, _MOST_CUTS)
             left -= float(patch.area)
         path, parts = bumped.result(parts)
-        patches = bumped.left(patches, smallest)
-    return path, parts
+        rest = bumped.without(rest)
+        lost += bumped.lost
+        patches = patches_of(rest, smallest)
+    return path, parts, float(shapely.area(rest).sum()) + lost
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,6 +148,8 @@ class _Bumped:
         self._begins: list[float] = []
         """Where they begin, in order, as lengths along the path; and the same where they end."""
         self._ends: list[float] = []
+        self.lost = 0.0
+        """About how much the bumps do not sweep any more, m²."""
         self._around: dict[tuple[int, int], list[_Bump]] = {}
         """Those that may be near to a square of the floor."""
 
@@ -157,16 +168,16 @@ class _Bumped:
                 if not (strip and self._step_aside(piece)):
                     self.reach(piece, cuts - 1)
 
-    def left(self, patches: list[Polygon], smallest: float) -> list[Polygon]:
-        """What bumps leave of some patches, each at least ``smallest`` m²."""
+    def without(self, rest: Shapes) -> Shapes:
+        """What bumps leave of some patches."""
         lines = np.array([bump.line for bump in self._bumps], dtype=object)
         swept = shapely.buffer(lines, self._radius, quad_segs=_ROUND)
-        rest = np.array(patches, dtype=object)
         of, bumps = shapely.STRtree(swept).query(rest, predicate="intersects")
+        rest = rest.copy()
         for patch in np.unique(of).tolist():
             # All at once: a long patch would be cut anew, in whole, for every one of them.
             rest[patch] = rest[patch].difference(shapely.union_all(swept[bumps[of == patch]]))
-        return patches_of(rest, smallest)
+        return rest
 
     def _step_aside(self, piece: Polygon) -> bool:
         """Leads a stretch of a straight leg nearer to a piece of a strip beside it."""
@@ -264,25 +275,27 @@ class _Bumped:
             return False
         most = losses * _LOSS * (self._radius / 0.2) ** 2
         line = LineString(new)
-        if last - first > 1e-9 and self._loses(new, first, last, most):
+        lost = self._lost(new, first, last) if last - first > 1e-9 else 0.0
+        if lost > most:
             return False
+        self.lost += lost
         self._put(_Bump(first, last, tips, line))
         return True
 
-    def _loses(self, new: Points, first: float, last: float, most: float) -> bool:
-        """Whether more than ``most`` m² are swept no more if the path goes along ``new`` from
-        ``first`` to ``last``; by looking at many small pieces of what was swept."""
+    def _lost(self, new: Points, first: float, last: float) -> float:
+        """About how much is swept no more if the path goes along ``new`` from ``first`` to
+        ``last``, m²; by looking at many small pieces."""
         begin, end = np.searchsorted(self._few_marks, [first + 1e-9, last - 1e-9])
         old = np.vstack([new[0], self._few[begin:end], new[-1]])
         spots, sizes = _pieces_along(old, self._radius)
         lost = _away(spots, _legs(new), self._radius)
-        if sizes[lost].sum() <= most:
-            return False
+        if not lost.any():
+            return 0.0
         spots, sizes = spots[lost], sizes[lost]
         lost = _away(spots, self._legs_around(spots, first, last), self._radius)
-        if sizes[lost].sum() <= most:
-            return False
-        return bool(sizes[lost][self._target.holds(spots[lost])].sum() > most)
+        if not lost.any():
+            return 0.0
+        return float(sizes[lost][self._target.holds(spots[lost])].sum())
 
     def _legs_around(self, spots: Points, first: float, last: float) -> Points:
         """M x 4: straight lines from which the tool may sweep one of the spots, if the path is not
@@ -367,50 +380,48 @@ def _pieces_along(line: Points, radius: float) -> tuple[Points, Points]:
     """What a disc sweeps beside a line, in small pieces: their middles, and their areas, m²."""
     steps = np.diff(line, axis=0)
     lengths = np.hypot(*steps.T)
-    line, steps, lengths = line[:-1][lengths > 1e-9], steps[lengths > 1e-9], lengths[lengths > 1e-9]
-    edges = radius * (1 - np.linspace(0, 1, _DEPTHS + 1) ** 2)
-    out, thick = (edges[:-1] + edges[1:]) / 2, edges[:-1] - edges[1:]
+    some = lengths > 1e-9
+    line, steps, lengths = line[:-1][some], steps[some], lengths[some]
     counts = np.ceil(lengths / (_STEP * radius)).astype(np.intp)
     rows = np.repeat(np.arange(len(steps)), counts)
     place = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
     feet = line[rows] + ((place + 0.5) / counts[rows])[:, None] * steps[rows]
-    along = steps[rows] / lengths[rows, None]
-    beside = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    wide = lengths[rows] / counts[rows]
-    headings = np.arctan2(steps[:, 1], steps[:, 0])
-    turns = (np.diff(headings) + math.pi) % math.tau - math.pi
-    counts = np.ceil(np.abs(turns) / _TURN).astype(np.intp)
-    rows = np.repeat(np.arange(len(turns)), counts)
-    place = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
-    turn = turns[rows] / counts[rows]
-    across = headings[rows] + (place + 0.5) * turn - np.copysign(math.pi / 2, turn)
-    corner = np.stack([np.cos(across), np.sin(across)], axis=1)
-    spots = np.concatenate(
-        [
-            feet[:, None] + side[:, None] * out[:, None]
-            for feet, side in (
-                (feet, beside),
-                (feet, -beside),
-                (line[rows + 1], corner),
-            )
-        ]
-    )
-    sizes = np.concatenate([*[wide[:, None] * thick] * 2, np.abs(turn)[:, None] * out * thick])
-    spots = spots.reshape(-1, 2)
-    if len(steps) == 1:
-        return spots, sizes.ravel()
-    # On the inner side of a corner a spot belongs to the leg that is nearest to it.
-    depths = np.broadcast_to(out - 1e-6, sizes.shape).ravel()
-    own = _away(spots, np.hstack([line, line + steps]), depths)
-    return spots[own], sizes.ravel()[own]
+    beside = (steps / lengths[:, None])[rows][:, ::-1] * (-1.0, 1.0)
+    wide = (lengths / counts)[rows]
+    out, thick = radius * _OUT, radius * _THICK
+    sizes = wide[:, None] * thick
+    aside = out[:, None] * beside[:, None]
+    spots = np.concatenate([feet[:, None] + aside, feet[:, None] - aside])
+    sizes = np.concatenate([sizes, sizes])
+    if len(steps) > 1:
+        headings = np.arctan2(steps[:, 1], steps[:, 0])
+        turns = (np.diff(headings) + math.pi) % math.tau - math.pi
+        counts = np.ceil(np.abs(turns) / _TURN).astype(np.intp)
+        rows = np.repeat(np.arange(len(turns)), counts)
+        place = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
+        turn = (turns / np.maximum(counts, 1))[rows]
+        across = headings[rows] + (place + 0.5) * turn - np.copysign(math.pi / 2, turn)
+        corner = np.stack([np.cos(across), np.sin(across)], axis=1)
+        more = line[rows + 1][:, None] + out[:, None] * corner[:, None]
+        spots = np.concatenate([spots, more])
+        sizes = np.concatenate([sizes, np.abs(turn)[:, None] * (out * thick)])
+        if np.abs(turns).max() > _SHARP:
+            # On the inner side of a corner a spot belongs to the leg that is nearest to it.
+            depths = np.broadcast_to(out - 1e-6, sizes.shape).ravel()
+            own = _away(spots.reshape(-1, 2), np.hstack([line, line + steps]), depths)
+            return spots.reshape(-1, 2)[own], sizes.ravel()[own]
+    return spots.reshape(-1, 2), sizes.ravel()
 
 
 def _away(spots: Points, legs: Points, radius: float | Points) -> NDArray[np.bool_]:
     """Which of N x 2 spots are farther than ``radius``, of all or of each, from all straight lines,
     M x 4."""
-    steps = legs[:, 2:] - legs[:, :2]
-    squared = np.maximum((steps**2).sum(axis=1), 1e-18)
-    out = spots[:, None] - legs[:, :2]
-    share = np.clip((out * steps).sum(axis=2) / squared, 0.0, 1.0)
-    out -= share[..., None] * steps
-    return np.asarray((out**2).sum(axis=2).min(axis=1, initial=np.inf) > np.square(radius))
+    # Coordinate by coordinate: sums over pairs take numpy longer than all the rest.
+    x0, y0, x1, y1 = legs.T
+    dx, dy = x1 - x0, y1 - y0
+    squared = np.maximum(dx * dx + dy * dy, 1e-18)
+    x, y = spots[:, :1] - x0, spots[:, 1:] - y0
+    share = ((x * dx + y * dy) / squared).clip(0.0, 1.0)
+    x -= share * dx
+    y -= share * dy
+    return np.asarray((x * x + y * y).min(axis=1, initial=np.inf) > np.square(radius))

@@ -46,6 +46,8 @@ from polepilot.core.planning.wording import in_words
 from polepilot.core.site import Site
 
 Gears = NDArray[np.int8]
+Planned = tuple[Points, Gears, tuple[PlanPart, ...], float | None]
+"""A path, its gears and parts, and where that is known well enough, how much it misses, m²."""
 Progress = Callable[[float, str], None]
 """Called with the share done, 0 to 1, and what is being done."""
 
@@ -115,14 +117,18 @@ def plan_scan(
         swept = _within_reach(wanted, swept, space, options, notes)
     target = Target(swept, options.tool_width)
     report(0.1, "loops")
-    path, gear, parts = _shortest(pieces, space, options, target, area is None, notes, report)
+    path, gear, parts, missed = _shortest(
+        pieces, space, options, target, area is None, notes, report
+    )
     report(0.8, "unreachable parts")
     missing = unreachable_pieces(space, reachable)
     report(0.9, "prediction")
-    small = wanted.area < _SMALL * options.tool_width**2
-    if small or swept is not wanted:
-        target = Target(wanted, options.tool_width, _FINE if small else CHORD)
-    left = target.missed_area(path)
+    left = missed if swept is wanted else None
+    if left is None:
+        small = wanted.area < _SMALL * options.tool_width**2
+        if small or swept is not wanted:
+            target = Target(wanted, options.tool_width, _FINE if small else CHORD)
+        left = target.missed_area(path)
     # All that a path sweeps is reachable; with patches it sweeps other floor as well.
     under = wanted.area - left if area is None else swept_shape(path, options.tool_width).area
     predicted = predict(path, gear, options, 1.0 - left / wanted.area, under)
@@ -181,11 +187,11 @@ def _shortest(
     whole: bool,
     notes: list[str],
     report: Progress,
-) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
+) -> Planned:
     """The path along loops in ``pieces``; on maps where that is soon done the shortest for some
     spacings of the loops."""
     plain = options.min_turn_radius <= 0
-    best: tuple[Points, Gears, tuple[PlanPart, ...]] | None = None
+    best: Planned | None = None
     least = math.inf
     spacings = [_CLOSER[:2], *((closer,) for closer in _CLOSER[2:])] if plain else [_CLOSER]
     trials = [(space, spacing) for spacing in spacings]
@@ -210,9 +216,9 @@ def _shortest(
         large = corners > _SOON[0] or target.area > _LARGE * target.tool**2
         if not plain or not whole or options.order == "paper" or large:
             return best or found
-        cost = path_cost(found[0], target)
+        cost = path_cost(found[0], found[3] or 0.0, target.tool)
         if cost < least:
-            best, least, best_spacing = found, cost, spacing
+            best, least, best_spacing = (*found[:3], None), cost, spacing
         if corners > _SOON[1]:
             break
         if not trials and free_start and corners <= _FEW:
@@ -336,8 +342,8 @@ def _path(
     target: Target,
     notes: list[str],
     whole: bool,
-) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
+) -> Planned:
     if options.min_turn_radius <= 0:
-        path, parts = sharp_path(runs, space, options, target, notes)
-        return path, np.ones(len(path) - 1, np.int8), parts
-    return driven_path(runs, space, options, target, notes, whole)
+        path, parts, missed = sharp_path(runs, space, options, target, notes)
+        return path, np.ones(len(path) - 1, np.int8), parts, missed
+    return *driven_path(runs, space, options, target, notes, whole), None

@@ -20,6 +20,8 @@ _TIP = 0.03
 """Of a patch so much, as a share of the tool's radius, may be left along its outline."""
 _ROUND = 12
 """Segments per quarter turn of a disc."""
+_ANGLES = np.arange(4 * _ROUND + 1) % (4 * _ROUND) * (math.pi / 2 / _ROUND)
+_CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 
 
 def patches_of(
@@ -39,8 +41,8 @@ def standing_place(patch: Polygon, space: FreeSpace, radius: float) -> shapely.G
     core = patch.buffer(-_TIP * radius, quad_segs=2)
     hull = shapely.convex_hull(patch if core.is_empty else core).simplify(0.001)
     corners = shapely.get_coordinates(hull)[:-1]
-    discs = shapely.buffer(shapely.points(corners), radius - 0.0005, quad_segs=_ROUND)
-    place = shapely.intersection_all(discs)
+    discs = corners[:, None] + (radius - 0.0005) * _CIRCLE
+    place = shapely.intersection_all(shapely.polygons(discs))
     if not space.holds(place):
         place = shapely.intersection(place, space.polygon)
     return None if place.is_empty else place
@@ -63,12 +65,10 @@ def _sliced(patch: Polygon, count: int) -> list[Polygon]:
     if box is None:
         return []
     corner, along, across = box
-    found: list[Polygon] = []
-    for step in range(count):
-        first, last = (corner + along * share / count for share in (step, step + 1))
-        strip = Polygon([first, last, last + across, first + across])
-        found += [part for part in polygons(patch.intersection(strip)) if part.area > 1e-5]
-    return found
+    cuts = corner + np.linspace(0, 1, count + 1)[:, None] * along
+    rings = np.stack([cuts[:-1], cuts[1:], cuts[1:] + across, cuts[:-1] + across], axis=1)
+    parts = shapely.intersection(patch, shapely.polygons(rings))
+    return [part for part in polygons(parts) if part.area > 1e-5]
 
 
 def strip_of(patch: Polygon, pitch: float) -> list[Polygon]:

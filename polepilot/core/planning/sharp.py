@@ -21,6 +21,9 @@ from polepilot.core.planning.swept import few_corners
 from polepilot.core.planning.target import Target
 from polepilot.core.planning.trim import trimmed
 
+Swept = tuple[Points, tuple[PlanPart, ...], float]
+"""A path, its parts, and about how much it misses, m²."""
+
 _LEAST = 0.0065
 """Missed patches smaller than this share of the tool's square get no bump."""
 _SHARE = 0.00008
@@ -50,7 +53,7 @@ def sharp_path(
     options: PlanOptions,
     target: Target,
     notes: list[str],
-) -> tuple[Points, tuple[PlanPart, ...]]:
+) -> Swept:
     """Corners as sharp as they come, all forward; with bumps to what is missed."""
     tool = options.tool_width
     smallest = min(_LEAST * tool**2, _SHARE * target.area)
@@ -84,12 +87,12 @@ def sharp_path(
         found.append(_with_bumps(*longer, space, options, target))
     if not found or (more > bumpy / _ABOUT and tried):
         found.append(_with_bumps(path, parts, space, options, target, missed))
-    return min(found, key=lambda way: path_cost(way[0], target))
+    return min(found, key=lambda way: path_cost(way[0], way[2], target.tool))
 
 
-def path_cost(path: Points, target: Target) -> float:
-    """Its length, and for what it misses of ``target`` more than it would take to sweep that."""
-    return path_length(path) + _DEAR * target.missed_area(path) / target.tool
+def path_cost(path: Points, missed: float, tool: float) -> float:
+    """Its length, and for the ``missed`` m² more than it would take to sweep them."""
+    return path_length(path) + _DEAR * missed / tool
 
 
 def _with_bumps(
@@ -99,7 +102,7 @@ def _with_bumps(
     options: PlanOptions,
     target: Target,
     missed: shapely.Geometry | None = None,
-) -> tuple[Points, tuple[PlanPart, ...]]:
+) -> Swept:
     """The path with bumps to what it misses, if that is known already ``missed``."""
     return with_bumps(
         path,

@@ -7,7 +7,7 @@ import shapely
 from numpy.typing import NDArray
 
 from polepilot.core.plan import PlanPart
-from polepilot.core.planning.swept import few_corners, swept_pieces, swept_shape
+from polepilot.core.planning.swept import few_corners, swept_by, swept_shape
 from polepilot.core.planning.target import CHORD, Target
 
 Points = NDArray[np.float64]
@@ -61,7 +61,8 @@ class _Tail:
         self._few, self._few_marks = path[few], self._marks[few]
         pairs = np.stack([self._few[:-1], self._few[1:]], axis=1)
         self._tree = shapely.STRtree(shapely.linestrings(pairs))
-        self._pieces = swept_pieces(self._few, target.tool / 2)
+        after = np.vstack([self._few[2:], np.full((1, 2), np.nan)])
+        self._segments = np.hstack([self._few[:-1], self._few[1:], after])
 
     def without(self, length: float) -> Points:
         """The path without the last ``length`` metres."""
@@ -78,7 +79,8 @@ class _Tail:
         near = self._tree.query(shapely.linestrings(tail), predicate="dwithin", distance=self._tool)
         before = near[near < len(head) - 2]
         last = swept_shape(head[-2:], self._tool)
-        rest = swept.difference(shapely.union_all([*self._pieces[before], last]))
+        pieces = swept_by(self._segments[before], self._tool / 2)
+        rest = swept.difference(shapely.union_all([*pieces, last]))
         return self._target.area_in(rest)
 
     @staticmethod

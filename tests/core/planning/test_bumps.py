@@ -24,7 +24,7 @@ def _bumped(path: list[list[float]], target: shapely.Polygon) -> tuple[np.ndarra
     space = free_space(maps.site(maps.box(-2, -2, 4, 4)), PlanOptions(min_turn_radius=0))
     line, area = np.array(path, dtype=float), MultiPolygon([target])
     parts = (PlanPart("loop", 0, 1), PlanPart("loop", 1, len(line) - 1))
-    points, moved = with_bumps(line, parts, Target(area, TOOL), space, 0.0005)
+    points, moved, _ = with_bumps(line, parts, Target(area, TOOL), space, 0.0005)
     assert [part.kind for part in moved] == ["loop", "loop"]
     assert moved[0].last == moved[1].first
     assert moved[1].last == len(points) - 1

@@ -30,7 +30,7 @@ def _planned(space: FreeSpace, order: Order = "default") -> tuple[np.ndarray, tu
     strokes = nested_loops([space.polygon], TOOL, 0.002, overlap=0.004)
     runs = ordered_runs(strokes, (0.5, 0.5), space, options.order, TOOL, 0.22)
     notes: list[str] = []
-    path, parts = sharp_path(runs, space, options, target, notes)
+    path, parts, _ = sharp_path(runs, space, options, target, notes)
     assert notes == []
     return path, parts, target
 
@@ -53,7 +53,8 @@ def test_what_is_missed_costs_more_than_the_path_that_would_sweep_it() -> None:
     half = np.array([[0.2, 0.5], [2.0, 0.5]])
     whole = np.array([[0.2, 0.5], [3.8, 0.5]])
     assert path_length(half) == pytest.approx(1.8)
-    assert path_cost(whole, target) < path_cost(half, target)
+    left = [target.missed_area(way) for way in (half, whole)]
+    assert path_cost(whole, left[1], TOOL) < path_cost(half, left[0], TOOL)
 
 
 def test_a_chain_of_passes_takes_the_nearest_end_next() -> None:

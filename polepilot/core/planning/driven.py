@@ -180,9 +180,11 @@ def _drive(
 ) -> None:
     """Drives the runs; leaves out what cannot be reached or followed, or with the first of them
     all, unless it is to be driven ``anyway``."""
-    for run in runs:
+    for run, following in zip(runs, [*runs[1:], None], strict=True):
         here = driver.track.pose.position
-        points = driver.enter(run.points)
+        # The rest of another loop goes on where this one begins.
+        back = following is not None and following.stroke.closed and not following.whole
+        points = driver.enter(run.points, run.whole and not back)
         if points is None and not (anyway or driver.track.last):
             return
         if points is None:

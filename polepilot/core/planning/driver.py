@@ -13,6 +13,7 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from polepilot.core import geometry
@@ -53,6 +54,8 @@ _AT_ONCE = 24
 """So many curves are looked at at once."""
 _CURVES = 6
 """So many curves to a pose are looked at."""
+_ALONG = (1.45, 1.6, 2.0, 3.0)
+"""So far ahead of the robot a loop may be entered, in turning radii."""
 _AHEAD = (0.0, -0.6, 1.0, 1.6, 2.4)
 """How far beyond a place its line may be joined, to drive back to it, in turning radii."""
 _BACK_OUT = (0.25, 0.5, 0.8, 1.2, 1.8, 2.6, 3.8, 5.5, 8.0, 12.0, 20.0, 40.0)
@@ -97,8 +100,13 @@ class Driver:
                 return
             index = resumed
 
-    def enter(self, points: Points) -> Points | None:
-        """Goes to the first leg of ``points``, or else to a later one; what is left to follow."""
+    def enter(self, points: Points, closed: bool = False) -> Points | None:
+        """Goes to the first leg of ``points``, or else to a later one; what is left to follow.
+
+        ``closed``: they are a loop, which may begin anywhere: where it is got to with least effort.
+        """
+        if closed and (loop := self._join(points)) is not None:
+            return loop
         step = points[1] - points[0]
         place = (float(points[0, 0]), float(points[0, 1]))
         if self.connect(place, math.atan2(step[1], step[0])):
@@ -106,6 +114,33 @@ class Driver:
         points = _tidy(points)
         leg = self._resume(points, 0)
         return None if leg is None else points[leg - 1 :]
+
+    def _join(self, loop: Points) -> Points | None:
+        """Gets onto a loop by one curve; the loop from there on. None, and nothing is driven, if it
+        is best entered where it begins."""
+        here = self.track.pose.position
+        place, heading = _begin(loop, 0)
+        if math.dist(here, place) < 1e-6:
+            return None
+        direct = self._direct(place, heading)
+        least = math.inf if direct is None else direct[0] - 1e-6
+        best: tuple[Curve, Points] | None = None
+        marks = np.r_[0.0, np.cumsum(np.hypot(*np.diff(loop, axis=0).T))]
+        beside = float(shapely.LineString(loop).project(shapely.Point(here)))
+        for share in _ALONG:
+            begun = _begun_at(loop, marks, (beside + share * self._radius) % marks[-1])
+            place, heading = _begin(begun, 0)
+            if math.dist(begun[0], begun[1]) < self._radius:
+                continue  # a corner that follows needs its room
+            if math.dist(here, place) > 4 * self._radius:
+                continue
+            direct = self._direct(place, heading)
+            if direct is not None and direct[0] < least:
+                least, best = direct[0] - 1e-6, (direct[1], begun)
+        if best is None:
+            return None
+        self.track.append(best[0])
+        return best[1]
 
     def head_for(self, place: geometry.Point) -> bool:
         """Goes to ``place``, looking wherever: one curve and straight on, or what is cheaper.
@@ -412,6 +447,16 @@ def _wide_turns(points: Points, radius: float, cut: float) -> Iterator[float]:
     room = np.minimum(lengths[:-1], lengths[1:]) / 2
     wide = (radius * np.tan(half) > room) | (radius * (1 / np.cos(half) - 1) > cut)
     yield from turns[wide].tolist()
+
+
+def _begun_at(loop: Points, marks: Points, first: float) -> Points:
+    """A closed line, with the lengths along it, from one of these lengths on around."""
+    if first <= 0 or first >= marks[-1]:
+        return loop
+    index = int(np.searchsorted(marks, first, side="right"))
+    share = (first - marks[index - 1]) / (marks[index] - marks[index - 1])
+    place = loop[index - 1] + share * (loop[index] - loop[index - 1])
+    return np.vstack([place, loop[index:], loop[1:index], place])
 
 
 def _begin(points: Points, leg: int) -> tuple[geometry.Point, float]:

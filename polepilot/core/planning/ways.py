@@ -150,7 +150,7 @@ def _search(
     x, y, heading = poses[:, :3].T
     begin = _States(x, y, heading, np.zeros(count), np.full(count, -1), np.arange(count))
     found = _checked(space, [begin], radius, goal, 0.0)
-    for share, most in _STEPS if levels == _MOST_LEVELS else _STEPS[:1]:
+    for share, most in _STEPS:
         if found is not None:
             return found
         step = share * radius

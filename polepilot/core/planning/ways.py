@@ -35,6 +35,8 @@ _TURN = math.radians(8.0)
 """Headings nearer to each other than this count as one."""
 
 _MOVES = tuple((kind, sign) for kind in "SLR" for sign in (1.0, -1.0))
+_SIDES = np.array([{"S": 0.0, "L": 1.0, "R": -1.0}[kind] for kind, _ in _MOVES])
+_SIGNS = np.array([sign for _, sign in _MOVES])
 
 
 @dataclass(slots=True, eq=False)
@@ -284,52 +286,21 @@ def _best(good: NDArray[np.bool_], cost: Array) -> list[int]:
 
 
 def _moved(space: FreeSpace, states: _States, radius: float, step: float) -> _States:
-    """The states one piece farther on that are free."""
-    found: list[_States] = []
-    for move, (kind, sign) in enumerate(_MOVES):
-        rows = np.flatnonzero(states.move != (move ^ 1))  # not just back again
-        heading = states.heading[rows]
-        if kind == "S":
-            new = heading
-            moves = [
-                (share * sign * step * np.cos(heading), share * sign * step * np.sin(heading))
-                for share in (0.5, 1.0)
-            ]
-        else:
-            side = 1.0 if kind == "L" else -1.0
-            turns = [heading + side * sign * share * step / radius for share in (0.5, 1.0)]
-            new = turns[1]
-            moves = [
-                (
-                    side * radius * (np.sin(turn) - np.sin(heading)),
-                    -side * radius * (np.cos(turn) - np.cos(heading)),
-                )
-                for turn in turns
-            ]
-        x, y = states.x[rows], states.y[rows]
-        free = np.ones(len(rows), dtype=bool)
-        for dx, dy in moves[::-1]:
-            free[free] = space.holds_each(np.stack([(x + dx)[free], (y + dy)[free]], axis=1))
-        cost = states.cost[rows] + step + _changed(states, sign)[rows]
-        dx, dy = moves[1]
-        found.append(
-            _States(
-                (x + dx)[free],
-                (y + dy)[free],
-                new[free],
-                cost[free],
-                np.full(int(free.sum()), move),
-                rows[free],
-            )
-        )
-    return _States(
-        np.concatenate([block.x for block in found]),
-        np.concatenate([block.y for block in found]),
-        np.concatenate([block.heading for block in found]),
-        np.concatenate([block.cost for block in found]),
-        np.concatenate([block.move for block in found]),
-        np.concatenate([block.parent for block in found]),
-    )
+    """The states one piece farther on that are free, by each of the moves."""
+    moves, rows = np.nonzero(states.move != (np.arange(len(_MOVES)) ^ 1)[:, None])  # no way back
+    x, y, heading = states.x[rows], states.y[rows], states.heading[rows]
+    whole: tuple[Array, Array] = (x, y)
+    free = np.ones(len(rows), dtype=bool)
+    for share in (1.0, 0.5):
+        bend = _SIDES[moves] * _SIGNS[moves] * share * step / radius
+        chord = _SIGNS[moves] * share * step * np.sinc(bend / math.tau)
+        there = x + chord * np.cos(heading + bend / 2), y + chord * np.sin(heading + bend / 2)
+        whole = there if share == 1.0 else whole
+        free[free] = space.holds_each(np.stack(there, axis=1)[free])
+    turned = heading + _SIDES[moves] * _SIGNS[moves] * step / radius
+    changed = (states.move[rows] >= 0) & ((states.move[rows] % 2 == 0) != (_SIGNS[moves] > 0))
+    cost = states.cost[rows] + step + np.where(changed, CHANGE, 0.0)
+    return _States(whole[0], whole[1], turned, cost, moves, rows).take(np.flatnonzero(free))
 
 
 def _cells(states: _States, step: float) -> Indices:

@@ -55,6 +55,9 @@ LONGEST = 200_000.0
 """A plan longer than this would not be a day's work but a year's, metres."""
 _CLOSER = (1.0, 0.0, 0.95, 0.9)
 """Spacings that are tried; see ``nested_loops``."""
+_SPARSE = 0.04
+_CLOSER_THEN = 0.955
+"""Where loops with many corners leave more than this share they lie this much closer."""
 _SOON = (2000, 600)
 """With more corners than the first no other spacing is tried, up to the second all of them."""
 _FEW = 250
@@ -282,6 +285,12 @@ def _strokes(
         cost = _cost(strokes, extra)
         if strokes and cost < least:
             best, least = strokes, cost
+        tracks = [stroke.track for stroke in loops]
+        if plain and whole and closer == 1 and sum(map(len, tracks)) > _SOON[1]:
+            if target.missed_area(*tracks) > _SPARSE * target.area:
+                loops = nested_loops(pieces, tool, tolerance, _CLOSER_THEN, _TOUCH)
+                return _completed(loops, space, target, smallest, passed)
+            break
         if len(loops) > _MANY or target.area > _LARGE * tool**2:
             break  # on a large map the spacing matters less than the time to think about it
     return best

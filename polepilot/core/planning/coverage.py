@@ -286,7 +286,7 @@ def _strokes(
         if strokes and cost < least:
             best, least = strokes, cost
         tracks = [stroke.track for stroke in loops]
-        if plain and whole and closer == 1 and sum(map(len, tracks)) > _SOON[1]:
+        if plain and closer == 1 and sum(map(len, tracks)) > _SOON[1]:
             if target.missed_area(*tracks) > _SPARSE * target.area:
                 loops = nested_loops(pieces, tool, tolerance, _CLOSER_THEN, _TOUCH)
                 return _completed(loops, space, target, smallest, passed)

@@ -1,4 +1,4 @@
-/* Linear equations. */
+/* Linear equations, and the middle one of some values. */
 #include "internal.h"
 
 #include <math.h>
@@ -54,4 +54,17 @@ int eye_solve(double *matrix, double *right, int n, int rights)
             sums[c] *= scale[i];
     }
     return 1;
+}
+
+/* The middle one of some values, which are sorted for that; 0 of none. */
+double eye_median(double *values, int n)
+{
+    for (int i = 1; i < n; i++) {
+        double value = values[i];
+        int at = i;
+        for (; at > 0 && values[at - 1] > value; at--)
+            values[at] = values[at - 1];
+        values[at] = value;
+    }
+    return n > 0 ? (values[(n - 1) / 2] + values[n / 2]) / 2 : 0;
 }

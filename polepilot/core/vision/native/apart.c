@@ -26,9 +26,7 @@ static void look(const eye_picture *p, const eye_upright *u, const eye_scale *sc
     double gap = side->half + NEAR + side->half / 4;
     double offset[SAMPLES] = {-LOOKED_AT * side->half, 0, LOOKED_AT * side->half,
                              -gap - 1, -gap, gap, gap + 1};
-    double upper = scale->middle + scale->unit * (from + TRIM) / (1 + scale->sag * (from + TRIM));
-    double end = from + 1 - TRIM;
-    double lower = scale->middle + scale->unit * end / (1 + scale->sag * end);
+    double upper = eye_row_at(scale, from + TRIM), lower = eye_row_at(scale, from + 1 - TRIM);
     int top = eye_ceil(upper), count = eye_floor(lower) - top + 1;
     if (count < 1) {
         top = eye_floor((upper + lower) / 2 + 0.5);

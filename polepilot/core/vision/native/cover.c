@@ -60,15 +60,10 @@ static double median_dark(double levels[][EYE_LIGHTS], const char *code, int seg
 {
     double values[EYE_MOST_SEGMENTS];
     int n = 0;
-    for (int i = 2; i < segments - 2; i++) {
-        if (code[i] != '0')
-            continue;
-        int at = n++;
-        for (; at > 0 && values[at - 1] > levels[i][channel]; at--)
-            values[at] = values[at - 1];
-        values[at] = levels[i][channel];
-    }
-    return (values[(n - 1) / 2] + values[n / 2]) / 2;
+    for (int i = 2; i < segments - 2; i++)
+        if (code[i] == '0')
+            values[n++] = levels[i][channel];
+    return eye_median(values, n);
 }
 
 /* The largest difference in any channel. */
@@ -110,8 +105,7 @@ static int is_border(const eye_picture *p, const eye_upright *u, const eye_scale
                             below[way] < segments - 1 ? below[way] + 1 : segments - 1, i};
             double tried[3][3];
             for (int part = 0; part < 3; part++) {
-                double row = scale->middle +
-                             scale->unit * (at[part] + 0.5 + SLANT * tilt - segments / 2.0);
+                double row = eye_row_at(scale, at[part] + 0.5 + SLANT * tilt - segments / 2.0);
                 double column = side->column + u->lean * (row - u->row) +
                                 (2 * way - 1) * (gap + out * FARTHER * side->half);
                 if (!beside(p, row, 0.2 * scale->unit, column, (2 * way - 1) * step, tried[part]))
@@ -157,8 +151,7 @@ int eye_covered(const eye_picture *p, const eye_task *task, const eye_upright *u
         for (int i = 0; i < segments; i++) {
             int bit = code[i] == '0' && i % 2 == 1;
             for (int tilt = -bit; tilt <= bit; tilt++) { /* what lies across may lie aslant */
-                double place = i + 0.5 + ASLANT * tilt - segments / 2.0;
-                double row = scale->middle + scale->unit * place;
+                double row = eye_row_at(scale, i + 0.5 + ASLANT * tilt - segments / 2.0);
                 double column = side->column + u->lean * (row - u->row) + sign * gap;
                 double light[3];
                 if (row < 0 || row > p->rows - 1) /* out of the picture */

@@ -40,17 +40,12 @@ typedef struct {
     double light[MOST_SAMPLES][3];
 } across;
 
-static double row_at(const view *v, double place)
-{
-    return v->scale->middle + v->scale->unit * place / (1 + v->scale->sag * place);
-}
-
 /* Linear light between two places along the strip (segments from its middle), ``n`` samples across;
  * 0 where that lies outside the picture. */
 static int look(const view *v, double from, double to, const double *offset, int n, across *out)
 {
     const eye_picture *p = v->picture;
-    double upper = row_at(v, from), lower = row_at(v, to);
+    double upper = eye_row_at(v->scale, from), lower = eye_row_at(v->scale, to);
     int top = (int)ceil(upper), bottom = (int)floor(lower);
     if (bottom < top)
         top = bottom = (int)lround((upper + lower) / 2);
@@ -93,7 +88,7 @@ static double rest_of_beside(const view *v, double from, double to, const across
 {
     double least = HUGE_VAL, gap = v->half + 1 + v->half / 4;
     double offset[4] = {-gap - 1, -gap, gap, gap + 1};
-    double middle = v->column + v->lean * (row_at(v, (from + to) / 2) - v->row);
+    double middle = v->column + v->lean * (eye_row_at(v->scale, (from + to) / 2) - v->row);
     int left = middle - gap >= 1, right = middle + gap <= v->picture->columns - 2;
     across sides, ground;
     if (!look(v, from, to, offset, 4, &sides))
@@ -165,7 +160,7 @@ static int look_at_bar(const view *v, const across *bits, double contrast, doubl
         return EYE_READ;
     double paint = rest_of(v, &bar, bits, gain_of(v, &bar, bits)) / contrast;
     double ground = rest_of_beside(v, bar_from, bar_to, &bar) / contrast;
-    if (row_at(v, from) >= 0 && row_at(v, to) <= v->picture->rows - 1 &&
+    if (eye_row_at(v->scale, from) >= 0 && eye_row_at(v->scale, to) <= v->picture->rows - 1 &&
         look(v, from, to, v->offset, v->n, &beyond)) {
         double alike = rest_of(v, &beyond, &bar, 1) / contrast;
         double beside = rest_of_beside(v, from, to, &beyond) / contrast;

@@ -148,9 +148,8 @@ static int read_candidate(const eye_picture *picture, const eye_task *task,
 /* Whether more than half of an end bar is out of the picture. */
 static int lacks_bar(const eye_picture *p, const eye_scale *scale, int segments)
 {
-    double inner = segments / 2.0 - 1, sag = scale->sag * inner;
-    return scale->middle - scale->unit * inner / (1 - sag) < -0.5 ||
-           scale->middle + scale->unit * inner / (1 + sag) > p->rows - 0.5;
+    double inner = segments / 2.0 - 1;
+    return eye_row_at(scale, -inner) < -0.5 || eye_row_at(scale, inner) > p->rows - 0.5;
 }
 
 /* Whether both sides of a strip are in the picture as far down and up as its rows are. */

@@ -3,7 +3,8 @@
  * A landmark's dark segments are painted with one black, and its sides are straight. What covers a
  * bit has another black (or other paint, where it is bright), or ends amid the dark rows, or shows
  * beside the pole at just these rows, with the very light that the bit has. Each of that alone
- * happens without a cover, if rarely, so they are added up; only what is seen at both sides of the pole is enough by itself. */
+ * happens without a cover, if rarely, so they are added up; only what is seen at both sides of the
+ * pole is enough by itself. */
 #include "internal.h"
 
 #include <math.h>
@@ -65,30 +66,7 @@ typedef struct {
 
 static double row_of(const scene *s, double place)
 {
-    double off = place - s->segments / 2.0;
-    return s->scale->middle + s->scale->unit * off / (1 + s->scale->sag * off);
-}
-
-/* As floor and ceil, which are slow on a plain x86-64; of numbers that an int can hold. */
-static inline int down(double value)
-{
-    int whole = (int)value;
-    return whole - (whole > value);
-}
-
-static inline int up(double value) { return -down(-value); }
-
-/* The middle one of some values, which are sorted for that. */
-static double middle_of(double *values, int n)
-{
-    for (int i = 1; i < n; i++) {
-        double value = values[i];
-        int at = i;
-        for (; at > 0 && values[at - 1] > value; at--)
-            values[at] = values[at - 1];
-        values[at] = value;
-    }
-    return n > 0 ? (values[(n - 1) / 2] + values[n / 2]) / 2 : 0;
+    return eye_row_at(s->scale, place - s->segments / 2.0);
 }
 
 /* The largest difference in any channel, of bright - dark. */
@@ -124,8 +102,8 @@ static void fill_margin(const eye_picture *p, const eye_upright *u, const eye_si
         double edge = side->column + u->lean * (y - u->row) + sign * side->half;
         const uint8_t *row = p->pixels + (ptrdiff_t)y * p->stride;
         for (int k = 0; k < STRIPS; k++) {
-            int from = up(edge + (sign > 0 ? from_side[k] : -to_side[k]));
-            int to = down(edge + (sign > 0 ? to_side[k] : -from_side[k]));
+            int from = eye_ceil(edge + (sign > 0 ? from_side[k] : -to_side[k]));
+            int to = eye_floor(edge + (sign > 0 ? to_side[k] : -from_side[k]));
             float part = 1 / (float)(to - from + 1);
             if (from < 0 || to >= p->columns)
                 out->seen[k] = 0;
@@ -143,9 +121,9 @@ static void fill_margin(const eye_picture *p, const eye_upright *u, const eye_si
 static int light_between(const margin *of, int strip, double from, double to, double *light)
 {
     double first = (from - of->first) / of->step, last = (to - of->first) / of->step;
-    int a = up(first), b = down(last);
+    int a = eye_ceil(first), b = eye_floor(last);
     if (b < a)
-        a = b = down((first + last) / 2 + 0.5);
+        a = b = eye_floor((first + last) / 2 + 0.5);
     if (a < 0 || b >= of->rows || !of->seen[strip])
         return 0;
     for (int c = of->from[strip]; c <= of->to[strip]; c++)
@@ -208,7 +186,7 @@ static double other_black(const scene *s, int i)
             values[n++] = s->levels[k][channel];
     if (n < 3)
         return 0;
-    double middle = middle_of(values, n);
+    double middle = eye_median(values, n);
     double spread = fmax(values[n - 1] - middle, middle - values[0]) / s->contrast;
     double off = fabs(s->levels[i][channel] - middle) / s->contrast;
     return at_most(off / (OTHER_BLACK + OTHER_SPREAD * spread));
@@ -247,7 +225,7 @@ static void know_sides(scene *s, const eye_task *task)
             values[n++] = width[k];
         }
         s->shows[way] = n >= s->segments - 2;
-        s->straight[way] = middle_of(values, n);
+        s->straight[way] = eye_median(values, n);
     }
 }
 
@@ -295,10 +273,10 @@ static int know_dark_rows(scene *s, const eye_upright *u)
     int n = dark_rows(s, u, 0, 0, values);
     if (n < 3)
         return 0;
-    s->black = middle_of(values, n);
+    s->black = eye_median(values, n);
     for (int i = 0; i < n; i++)
         values[i] = fabs(values[i] - s->black);
-    s->usual = 1.48 * middle_of(values, n);
+    s->usual = 1.48 * eye_median(values, n);
     return 1;
 }
 
@@ -331,7 +309,7 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
         for (int i = 2; i < segments - 2; i++)
             if (code[i] == '0')
                 values[n++] = levels[i][c];
-        s.dark[c] = middle_of(values, n);
+        s.dark[c] = eye_median(values, n);
         s.bright[c] = (levels[0][c] + levels[1][c] + levels[segments - 2][c] +
                        levels[segments - 1][c]) / 4;
         if (c < p->channels)

@@ -94,6 +94,13 @@ int eye_in_front(const eye_picture *picture, const eye_task *task, const eye_upr
 
 /* ---- numbers ---- */
 
+/* The row that lies so many segments below a code's middle. */
+static inline double eye_row_at(const eye_scale *scale, double below)
+{
+    return scale->middle + scale->unit * below / (1 + scale->sag * below);
+}
+
+double eye_median(double *values, int n);
 int eye_solve(double *matrix, double *right, int n, int rights);
 int eye_decode(const char *code, int segments);
 void eye_encode(int id, int bits, char *code);

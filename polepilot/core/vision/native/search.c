@@ -137,7 +137,8 @@ static void fill_light(const eye_hits *hits, const uint8_t *signal, int first, i
         if (signal[y] == 0)
             continue;
         int from = y - EYE_BLEEDING > 0 ? y - EYE_BLEEDING : 0;
-        int next = end < 0 ? from : end, ends = y + EYE_BLEEDING + 1 < p->rows ? y + EYE_BLEEDING + 1 : p->rows;
+        int next = end < 0 ? from : end;
+        int ends = y + EYE_BLEEDING + 1 < p->rows ? y + EYE_BLEEDING + 1 : p->rows;
         for (int k = next; k < ends; k++)
             light[k] = (uint8_t)(eye_brightness(pixel + k * p->stride, p->channels, hits->task) / 16);
         if (next < from) {
@@ -171,9 +172,9 @@ static int explains(const eye_hits *hits, int known, int first, int last)
     return 0;
 }
 
-/* Codes in one column: near ones among the runs of its colour, and in every second column of its
- * brightness where that does not explain most of it, as JPEG and cheap sensors leave brightness sharper; far ones. ``light``: room
- * for a column. */
+/* Codes in one column: near ones among the runs of its colour, and in some columns (LIGHT_APART) of
+ * its brightness where that does not explain most of it, as JPEG and cheap sensors leave brightness
+ * sharper; far ones. ``light``: room for a column. */
 static void look_at(eye_hits *hits, const uint8_t *signal, int first, int last, int x,
                     uint8_t *light)
 {

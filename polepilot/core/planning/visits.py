@@ -83,10 +83,6 @@ class _Visit:
     points: Points
     gears: Gears
 
-    @property
-    def line(self) -> LineString:
-        return LineString(self.points)
-
 
 class _Visitor:
     """A path while visits are added to it."""
@@ -101,6 +97,7 @@ class _Visitor:
         self._radius = radius
         self._poses = _poses(path, gear)
         self.visits: list[_Visit] = []
+        self._lines: list[LineString] = []
         self._failures = 0
 
     def reach(self, patch: Polygon, cuts: int, smallest: float) -> None:
@@ -111,7 +108,7 @@ class _Visitor:
         if place is not None:
             if self._visit(place):
                 return
-            cuts = min(cuts, 1)  # its pieces are reached by no other ways, or hardly ever
+            cuts = min(cuts, 2)  # its pieces are reached by no other ways, or hardly ever
         elif passes := cleanup_strokes(patch, self._tool, self._space, smallest):
             done = [self._pass(stroke.points) for stroke in passes]
             if all(done):
@@ -138,7 +135,7 @@ class _Visitor:
 
     def _visit(self, place: shapely.Geometry) -> bool:
         """Adds the cheapest way that is found to a place; True as well if one led there before."""
-        if any(shapely.intersects(place, visit.line) for visit in self.visits):
+        if shapely.intersects(place, np.array(self._lines, dtype=object)).any():
             return True
         circle = shapely.maximum_inscribed_circle(place, tolerance=0.002)
         x, y = (float(value) for value in shapely.get_coordinates(circle)[0])
@@ -177,13 +174,15 @@ class _Visitor:
         if not self._space.holds_points(points):
             return False
         self.visits.append(_Visit(int(row[3]), float(row[4]), points, gears))
+        self._lines.append(LineString(points))
         return True
 
     def _near(self, x: float, y: float) -> NDArray[np.intp]:
         """Poses on the path from which ways to a place are looked for."""
         distances = np.hypot(self._poses[:, 0] - x, self._poses[:, 1] - y)
-        order = np.argsort(np.round(distances, 6), kind="stable")[:_MOST_POSES]
-        return order[distances[order] < _NEAR * self._radius]
+        near = np.flatnonzero(distances < _NEAR * self._radius)
+        order = np.argsort(np.round(distances[near], 6), kind="stable")[:_MOST_POSES]
+        return near[order]
 
     def result(self, parts: tuple[PlanPart, ...]) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
         """The path with all visits, its gears, and its parts."""

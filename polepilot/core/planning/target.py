@@ -25,6 +25,8 @@ _TILE = 10.0
 """Side of a tile in tool widths, at most; more where the area is kilometres long."""
 _GRID = 1e-6
 """Corners of what is left at the edge of a tile lie on a grid so fine that neighbours fit, m."""
+_RIM = 0.002
+"""What is thinner than this on average is no part of a patch, metres."""
 _SAME = 1e-6
 """Bands whose keys differ by less than this are the same."""
 _MOST_TILES = 1000
@@ -53,15 +55,19 @@ class Target:
         self._known: dict[tuple[int, bytes], shapely.Geometry] = {}
 
     def missed(self, *lines: Points) -> MultiPolygon:
-        """What no disc along one of the lines, each N x 2 points, sweeps."""
+        """What no disc along one of the lines, each N x 2 points, sweeps.
+
+        Rims (see ``_RIM``) are cut where tiles end.
+        """
         parts, tiles = shapely.get_parts(self._left(lines), return_index=True)
         low, high = np.hsplit(shapely.bounds(parts).reshape(-1, 4), 2)
         inside = ((low > self._low[tiles] + _GRID) & (high < self._high[tiles] - _GRID)).all(axis=1)
         areal = shapely.get_type_id(parts) == _POLYGON
-        # What lies at the edge of a tile may go on in the next one.
-        edges = shapely.set_precision(parts[areal & ~inside], _GRID)
+        # What lies at the edge of a tile may go on in the next one, if it is more than a rim.
+        thick = 2 * shapely.area(parts) > _RIM * shapely.length(parts)
+        edges = shapely.set_precision(parts[areal & ~inside & thick], _GRID)
         joined = shapely.disjoint_subset_union_all(edges)
-        return MultiPolygon([*parts[areal & inside].tolist(), *polygons(joined)])
+        return MultiPolygon([*parts[areal & (inside | ~thick)].tolist(), *polygons(joined)])
 
     def missed_area(self, *lines: Points) -> float:
         """Its area, m²."""

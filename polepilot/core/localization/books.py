@@ -72,6 +72,11 @@ class Books:
             self._presence.forget()
         return sorted(against, key=lambda m: m.stamp)
 
+    @property
+    def agreeing(self) -> int:
+        """How many landmarks have agreed with this pose and have not been moved."""
+        return len(self._agreed.keys() - self.health.moved.keys())
+
     # ---- sightings ---------------------------------------------------------------------------
 
     def usable(self, measurement: RangeBearing) -> bool:

@@ -370,7 +370,9 @@ class Localizer:
     def _judge(self, track: Track) -> Suspected:
         misfit, books = track.filter.map_misfit, self._books
         moved, trial = books.health.moved, books.trial
-        suspected = self._suspicion.judge(track.stamp, len(self._landmarks), moved, misfit)
+        agreeing = books.agreeing if moved else None
+        count = len(self._landmarks)
+        suspected = self._suspicion.judge(track.stamp, count, moved, misfit, agreeing)
         doubted = books.doubt.spread > 0.0
         reason = suspected.reason or trial.doubt
         belief, known = self._belief, (track.moving, track.sigma)

@@ -18,6 +18,8 @@ from polepilot.core.geometry import Point
 
 _FEWEST = 3
 """So many landmarks that agree say which one does not."""
+_SEVERAL = 2
+"""So many that were moved, and nearly as many as agree, are more than somebody's carelessness."""
 _TIMES, _WITHIN = 3, 60.0
 """So often within so many seconds is more than chance."""
 _STRETCH = 2.0
@@ -72,7 +74,12 @@ class Suspicion:
         self._losses.append(stamp)
 
     def judge(
-        self, stamp: float, landmarks: int, moved: Mapping[int, Point], misfit: MapMisfit
+        self,
+        stamp: float,
+        landmarks: int,
+        moved: Mapping[int, Point],
+        misfit: MapMisfit,
+        agreeing: int | None = None,
     ) -> Suspected:
         """No reason where nothing is suspected.
 
@@ -80,6 +87,7 @@ class Suspicion:
             landmarks: of the map.
             moved: those found displaced, and by how much.
             misfit: of the map, by the filter.
+            agreeing: so many landmarks have agreed with this pose; None where nobody has counted.
         """
         self._map = misfit.excess > (_CALM if self._map else _SIGMAS)
         if moved and landmarks - len(moved) < _FEWEST:
@@ -87,6 +95,12 @@ class Suspicion:
             return Suspected(
                 f"Landmark {number} and the others contradict each other, and with so few of them "
                 "it cannot be told which one has been moved.",
+                max(math.hypot(*shift) for shift in moved.values()),
+            )
+        if agreeing is not None and len(moved) >= max(_SEVERAL, agreeing - 1):
+            return Suspected(
+                f"{len(moved)} landmarks are not in their places and only {agreeing} are: perhaps "
+                "this is not the map of this place.",
                 max(math.hypot(*shift) for shift in moved.values()),
             )
         if self._map:

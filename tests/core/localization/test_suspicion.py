@@ -48,6 +48,39 @@ def test_three_landmarks_farther_apart_than_on_the_map_are_suspected() -> None:
     assert Suspicion(0.2).judge(10.0, 3, {}, MapMisfit(4.0, 4.0, None, 1.5)).reason == ""
 
 
+def test_where_as_many_are_off_as_agree_the_map_is_suspected() -> None:
+    """One that was moved is carelessness; several, with hardly more that agree, are another map."""
+    moved = {4: (5.0, 1.0), 5: (0.3, 0.0)}
+    suspected = Suspicion(0.2).judge(10.0, 7, moved, MapMisfit(), 3)
+    assert "not the map of this place" in suspected.reason
+    assert suspected.spread == pytest.approx(np.hypot(5.0, 1.0))
+    assert Suspicion(0.2).judge(10.0, 7, moved, MapMisfit(), 4).reason == ""
+    assert Suspicion(0.2).judge(10.0, 7, {4: (5.0, 1.0)}, MapMisfit(), 2).reason == ""
+    more = {**moved, 6: (0.4, 0.4), 7: (1.0, 1.0)}
+    assert Suspicion(0.2).judge(10.0, 9, more, MapMisfit(), 5).reason != ""
+
+
+def test_a_pose_by_three_on_a_map_of_another_place_says_so() -> None:
+    """Landmarks 1 to 3 stand as on the map, by chance; 4 to 6 stand metres off."""
+    marks = {**MARKS, **{n: Landmark(n, 2.5 - 4.0 * (n == 4), 1.0 - n) for n in (4, 5, 6)}}
+    localizer = Localizer(marks, Vehicle(), 0.0)
+    here = Pose2D(0.2, 0.1, 0.3)
+    for index in range(240):
+        number = (1, 2, 3, 4, 1, 5, 2, 6, 3)[index // 4 % 9]
+        mark = marks[number]
+        dx, dy = {4: (1.5, 2.0), 5: (-2.0, 1.0), 6: (1.0, -1.7)}.get(number, (0.0, 0.0))
+        place = (mark.x + dx, mark.y + dy)
+        localizer.add_measurements([sight(0.1 * index, number, here, place)])
+        if localizer.status is Status.LOST:
+            localizer.refix(localizer.reason)
+        estimate = localizer.estimate(0.1 * index)
+    assert len(localizer.moved_landmarks) >= 2
+    assert estimate is not None
+    assert estimate.status is Status.DEGRADED
+    assert "not the map of this place" in estimate.reason
+    assert estimate.position_sigma > 2.0
+
+
 def test_two_cannot_say_which_of_three_was_moved() -> None:
     suspected = Suspicion(0.2).judge(10.0, 3, {7: (0.09, -0.12)}, MapMisfit())
     assert "Landmark 7" in suspected.reason

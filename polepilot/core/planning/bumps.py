@@ -43,6 +43,8 @@ _EDGES = 1 - np.linspace(0, 1, _DEPTHS + 1) ** 2
 _OUT, _THICK = (_EDGES[:-1] + _EDGES[1:]) / 2, _EDGES[:-1] - _EDGES[1:]
 _SHARP = 0.35
 """Where a path turns by less, what its inner side has twice does not matter, radians."""
+_FINE = 0.001
+"""How exactly patches are looked at, metres."""
 _FAR = 8.0
 """Bumps farther from each other than this, in the tool's radii, do not know of each other."""
 _LONGEST = 250.0
@@ -100,7 +102,7 @@ def with_bumps(
         for patch in sorted(patches, key=lambda p: (-float(p.area), p.bounds)):
             if left <= enough:
                 break
-            bumped.reach(patch, _MOST_CUTS)
+            bumped.reach(patch.simplify(_FINE), _MOST_CUTS)
             left -= float(patch.area)
         path, parts = bumped.result(parts)
         rest = bumped.without(rest)

@@ -285,14 +285,16 @@ def _strokes(
         cost = _cost(strokes, extra)
         if strokes and cost < least:
             best, least = strokes, cost
+        if target.area > _LARGE * tool**2:
+            break  # on a large map the spacing matters less than the time to think about it
         tracks = [stroke.track for stroke in loops]
         if plain and closer == 1 and sum(map(len, tracks)) > _SOON[1]:
             if target.missed_area(*tracks) > _SPARSE * target.area:
                 loops = nested_loops(pieces, tool, tolerance, _CLOSER_THEN, _TOUCH)
                 return _completed(loops, space, target, smallest, passed)
             break
-        if len(loops) > _MANY or target.area > _LARGE * tool**2:
-            break  # on a large map the spacing matters less than the time to think about it
+        if len(loops) > _MANY:
+            break
     return best
 
 

@@ -36,7 +36,9 @@ def patches_of(
 
 def standing_place(patch: Polygon, space: FreeSpace, radius: float) -> shapely.Geometry | None:
     """Where the middle of a tool of ``radius`` may be to sweep all of a patch; None: nowhere."""
-    if shapely.minimum_bounding_radius(patch) >= radius:
+    x0, y0, x1, y1 = patch.bounds
+    small = math.hypot(x1 - x0, y1 - y0) < 2 * radius
+    if not small and shapely.minimum_bounding_radius(patch) >= radius:
         return None
     core = patch.buffer(-_TIP * radius, quad_segs=2)
     hull = shapely.convex_hull(patch if core.is_empty else core).simplify(0.001)

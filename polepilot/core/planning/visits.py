@@ -108,7 +108,7 @@ class _Visitor:
         if place is not None:
             if self._visit(place):
                 return
-            cuts = min(cuts, 1)  # its pieces are reached by no other ways, or hardly ever
+            cuts = min(cuts, 2)  # its pieces are reached by no other ways, or hardly ever
         elif passes := cleanup_strokes(patch, self._tool, self._space, smallest):
             done = [self._pass(stroke.points) for stroke in passes]
             if all(done):

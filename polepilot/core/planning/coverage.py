@@ -74,8 +74,9 @@ others are visited from the path."""
 _BROAD = 0.36
 """Bumps do not sweep patches that are broader than twice this share of the tool's width."""
 _MANY = 24
+_MANY_FOR_WHEELS = 60
 _LARGE = 5000.0
-"""Up to so many squares of the tool several spacings are tried."""
+"""Up to so many loops, and squares of the tool, several spacings are tried."""
 _SMALL = 100.0
 _FINE = 0.0001
 """Up to so many squares of the tool the prediction takes arcs as exactly as this, metres."""
@@ -293,7 +294,7 @@ def _strokes(
                 loops = nested_loops(pieces, tool, tolerance, _CLOSER_THEN, _TOUCH)
                 return _completed(loops, space, target, smallest, passed)
             break
-        if len(loops) > _MANY:
+        if len(loops) > (_MANY if plain else _MANY_FOR_WHEELS):
             break
     return best
 

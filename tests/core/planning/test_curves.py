@@ -6,12 +6,20 @@ import math
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from polepilot.core.geometry import Pose2D, angle_between
-from polepilot.core.planning.curves import curve_length, gear_changes, sample, shortest_curves
-from polepilot.core.planning.turns import turns_round
+from polepilot.core.planning.curves import (
+    Curve,
+    curve_length,
+    gear_changes,
+    sample,
+    shortest_curves,
+    spots,
+)
+from polepilot.core.planning.turns import prepare, turns_round
 
 _pose = st.builds(Pose2D, st.floats(-4, 4), st.floats(-4, 4), st.floats(-math.pi + 1e-6, math.pi))
 
@@ -62,3 +70,40 @@ def test_the_least_of_turns_has_a_way(turn: float) -> None:
         ways = turns_round(side, 0.6)
         assert ways
         assert [way.cost for way in ways] == sorted(way.cost for way in ways)
+
+
+def test_spots_lie_on_their_curves() -> None:
+    poses = np.array([[1.0, 2.0, 0.3], [-1.0, 0.5, -2.0], [0.0, 0.0, 1.0]])
+    curves: list[Curve] = [
+        (("L", 1.0), ("R", -1.0), ("S", 0.5)),
+        (("S", -2.0),),
+        (("R", 0.4), ("S", -0.3), ("L", -0.9), ("R", 0.2)),
+    ]
+    points = spots(poses, curves, 0.6)
+    for pose, curve, some in zip(poses.tolist(), curves, points, strict=True):
+        line, _, end = sample(Pose2D(*pose), curve, 0.6)
+        assert some[-1] == pytest.approx(end.position)
+        track = shapely.LineString(line)
+        assert shapely.distance(track, shapely.points(some)).max() < 0.001
+        # On each piece, as far as its end.
+        marks = np.cumsum([abs(length) for _, length in curve])
+        driven = np.r_[0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T))]
+        for mark in marks:
+            there = [np.interp(mark, driven, column) for column in line.T]
+            assert np.hypot(*(some - there).T).min() < 0.01
+    same = spots(poses[:1], [curves[0], curves[0]], 0.6)
+    assert same[0] == pytest.approx(points[0, : same.shape[1]])
+    assert spots(poses[:1], [], 0.6).shape[0] == 0
+
+
+def test_turns_prepared_at_once_are_those_worked_out_one_by_one() -> None:
+    turns, radius = [0.0371, 0.7123, 1.5708, 2.9001], 0.6137
+    alone = [turns_round(turn, radius + 1e-9, every=False) for turn in turns]
+    prepare([*turns, -turns[0]], radius)
+    for turn, ways in zip(turns, alone, strict=True):
+        together = turns_round(turn, radius, every=False)
+        assert [way.cost for way in together] == pytest.approx([way.cost for way in ways], abs=1e-6)
+        mirrored = turns_round(-turn, radius, every=False)
+        assert [way.stop for way in mirrored] == [way.stop for way in together]
+        costs = {round(way.cost, 6) for way in turns_round(turn, radius)}
+        assert {round(way.cost, 6) for way in together} <= costs

@@ -282,6 +282,8 @@ def _strokes(
     least = math.inf
     for closer in spacings:
         loops = nested_loops(pieces, tool, tolerance, closer, overlap)
+        if _cost(loops, extra) >= least:
+            continue  # passes make that no less
         strokes = _completed(loops, space, target, smallest, passed)
         cost = _cost(strokes, extra)
         if strokes and cost < least:

@@ -53,6 +53,9 @@ class Target:
         self._error = error
         self._round = Footprint(tool / 2, error).quadrant
         self._known: dict[tuple[int, bytes], shapely.Geometry] = {}
+        self._asked: list[bytes] = []
+        """What was asked last, and the answer: it is often asked again."""
+        self._answer = self._tiles
 
     def missed(self, *lines: Points) -> MultiPolygon:
         """What no disc along one of the lines, each N x 2 points, sweeps.
@@ -89,6 +92,9 @@ class Target:
         """What the lines leave of each tile."""
         if not lines or not len(self._tiles):
             return self._tiles
+        asked = [line.tobytes() for line in lines]
+        if asked == self._asked:
+            return self._answer
         bands = bands_of(lines, self.tool / 2, self._round, self._error)
         found, tiles = self._tree.query(bands.tracks, predicate="intersects")
         keys = np.floor(bands.keys_near(found, self._low[tiles], self._high[tiles]) / _SAME + 0.3)
@@ -101,6 +107,7 @@ class Target:
                 if (tile, key) not in self._known:
                     self._known[tile, key] = self._without(tile, bands, found[near])
                 left[tile] = self._known[tile, key]
+        self._asked, self._answer = asked, left
         return left
 
     def _without(self, tile: int, bands: Bands, near: Indices) -> shapely.Geometry:

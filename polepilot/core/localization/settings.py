@@ -23,7 +23,7 @@ class LocalizerSettings:
     degraded_after: float = 2.0
     """Seconds of motion without a correction."""
     degraded_sigma: float = 0.10
-    lost_after: float = 12.0
+    lost_after: float = 20.0
     lost_sigma: float = 0.25
     steering_lag: float = 0.10
     """Time constant of the steering servo, seconds; the EKF learns the true one."""

@@ -73,6 +73,9 @@ _LONG = 3.0
 others are visited from the path."""
 _BROAD = 0.36
 """Bumps do not sweep patches that are broader than twice this share of the tool's width."""
+_DETAIL = 0.001
+"""How exactly outlines are taken to tell how broad a patch is, metres: ragged ones have hundreds of
+corners, and an offset by many times their size takes up to half a second."""
 _MANY = 24
 _MANY_FOR_WHEELS = 60
 _LARGE = 5000.0
@@ -341,7 +344,7 @@ def _broad(patch: Polygon, tool: float) -> bool:
     there is no loop for bumps."""
     if long_for_bumps(patch, tool):
         return True
-    return not patch.buffer(-_BROAD * tool, quad_segs=2).is_empty
+    return not patch.simplify(_DETAIL).buffer(-_BROAD * tool, quad_segs=2).is_empty
 
 
 def _long(patch: Polygon, tool: float) -> bool:

@@ -20,6 +20,7 @@ from polepilot.core.planning.driver import Driver
 from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.score import predict
 from polepilot.core.planning.space import FreeSpace, free_poles, free_space
+from polepilot.core.planning.track import without_jerks
 from polepilot.core.planning.unreachable import unreachable_pieces
 from polepilot.core.planning.wording import in_words, measured_in_words
 from polepilot.core.site import Site
@@ -219,22 +220,25 @@ def _driven(
     driver = Driver(
         space, options.min_turn_radius, Pose2D(*space.start.position, _first_heading(ways, space))
     )
+    ends = [0]
     for index, way in enumerate(ways):
-        before = _reversals(driver)
         heading = wanted.heading if index == len(ways) - 1 else None
         for goal in way[1:-1] if heading is not None else way[1:]:
             if not driver.head_for(goal) and not driver.head_for(way[-1]):
                 raise _impossible(wanted, index, options)
         if heading is not None and not driver.connect(way[-1], heading):
             raise _impossible(wanted, index, options)
-        changes = _reversals(driver) - before
+        ends.append(driver.track.last)
+    path, gears, moved = without_jerks(*driver.track.arrays())
+    path, gears, there = without_crumbs(path, gears, space)
+    counts = [np.count_nonzero(np.diff(gears[: there[moved[end]]])) for end in ends]
+    for index, changes in enumerate(np.diff(counts).tolist()):
         if changes:
             times = "once" if changes == 1 else f"{changes} times"
             notes.append(
                 f"On the way to node {index + 1} the robot changes its gear {times}: its turning "
                 f"radius of {in_words(options.min_turn_radius)} asks for it."
             )
-    path, gears, _ = without_crumbs(*driver.track.arrays(), space)
     return path, gears
 
 
@@ -257,8 +261,3 @@ def _first_heading(ways: list[list[Point]], space: FreeSpace) -> float:
         start.position,
     )
     return math.atan2(aim[1] - start.y, aim[0] - start.x)
-
-
-def _reversals(driver: Driver) -> int:
-    _, gear = driver.track.arrays()
-    return int(np.count_nonzero(np.diff(gear)))

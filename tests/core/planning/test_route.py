@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from shapely import LineString, Point, Polygon
 
 from polepilot.core.errors import PlanError, SiteError
 from polepilot.core.geometry import angle_between
+from polepilot.core.plan import Plan
 from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.route import plan_route
 from polepilot.core.site import Start, read_site
@@ -168,3 +170,62 @@ def test_turning_round_in_place() -> None:
     assert judge.sharpest(plan) >= 0.588
     assert judge.clearance_of(plan, site) >= 0.199
     assert plan.predicted.length < 8
+
+
+def gear_pieces(plan: Plan) -> list[float]:
+    """How long each piece between two changes of gear is, as the plan is written, metres."""
+    document = plan.to_json()
+    steps = np.hypot(*np.diff(np.array(document["path"]), axis=0).T)
+    bounds = np.flatnonzero(np.diff(np.array(document["gear"]), prepend=0))
+    return [float(length) for length in np.add.reduceat(steps, bounds)]
+
+
+def said_changes(plan: Plan) -> int:
+    """How often its notes say that the robot changes its gear."""
+    found = [re.search(r"changes its gear (once|\d+)", note) for note in plan.notes]
+    words = [match[1] for match in found if match]
+    return sum(1 if word == "once" else int(word) for word in words)
+
+
+def check_gear_pieces(plan: Plan) -> None:
+    """None so short that four digits turn it, and the notes count what is left of them."""
+    assert min(gear_pieces(plan)) > 0.001
+    assert said_changes(plan) == plan.predicted.reversals
+    written = np.array(plan.to_json()["path"])
+    assert np.hypot(*np.diff(written, axis=0).T).min() > 0
+
+
+def test_a_route_does_not_end_with_a_change_of_gear_on_the_spot() -> None:
+    site = maps.site(maps.box(0, 0, 4.13, 3.17), start=[3, 1, 0])
+    options = PlanOptions(clearance=0.15, min_turn_radius=0.3)
+    plan = plan_route(site, [(0.212, 2.065)], options, 1.642)
+    check_gear_pieces(plan)
+    assert plan.path[-1] == pytest.approx((0.212, 2.065), abs=1e-5)
+    last = plan.gear[-1] * (plan.path[-1] - plan.path[-2])
+    assert math.atan2(last[1], last[0]) == pytest.approx(1.642, abs=0.05)  # a chord of an arc
+
+
+def test_nor_does_it_change_its_gear_back_and_forth_on_a_node_that_comes_twice() -> None:
+    boundary = [[1.3919, 2.38812], [2.7838, 0.53225], [4.1757, 2.38812], [5.82308, 0.19161]]
+    boundary += [[5.31211, -0.19161], [4.1757, 1.32361], [2.7838, -0.53225], [1.3919, 1.32361]]
+    boundary += [[0.25548, -0.19161], [-0.25548, 0.19161]]
+    nodes = [(5.449, 0.215), (5.449, 0.215), (0.848, 1.306)]
+    plan = plan_route(maps.site(boundary), nodes, PlanOptions(min_turn_radius=0.6))
+    check_gear_pieces(plan)
+    assert max(LineString(plan.path).distance(Point(node)) for node in nodes) < 0.01
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.3, 0.6]))
+def test_no_route_in_a_room_has_a_gear_for_less_than_a_millimetre(seed: int, radius: float) -> None:
+    rng = np.random.default_rng(seed)
+    site = maps.site(maps.box(0, 0, *rng.uniform(2, 5, 2)))
+    nodes = [tuple(node) for node in rng.uniform(0.2, 1.8, (int(rng.integers(1, 4)), 2))]
+    options = PlanOptions(clearance=0.15, min_turn_radius=radius)
+    try:
+        plan = plan_route(site, nodes, options, float(rng.uniform(-3, 3)))
+    except PlanError:
+        return
+    check_gear_pieces(plan)
+    assert judge.clearance_of(plan, site) >= 0.149
+    assert judge.sharpest(plan) >= 0.98 * radius

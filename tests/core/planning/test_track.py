@@ -6,10 +6,14 @@ import math
 
 import numpy as np
 import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import LineString
 
 from polepilot.core.geometry import Pose2D
 from polepilot.core.planning.curves import CHANGE
-from polepilot.core.planning.track import Track
+from polepilot.core.planning.track import Track, without_jerks
 
 RADIUS = 0.6
 
@@ -60,3 +64,28 @@ def test_turned_round_the_same_curves_are_driven_tail_first() -> None:
     assert track.pose.heading == pytest.approx(0.0, abs=0.01)
     track.restore(saved)
     assert track.sign == 1
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(st.tuples(st.sampled_from("SLR"), st.booleans(), st.floats(0, 1)), max_size=9))
+def test_without_jerks_a_path_keeps_its_place_and_its_ends(
+    drawn: list[tuple[str, bool, float]],
+) -> None:
+    """Pieces of 20 cm to 1 m and, as often, of up to 2 mm, in any gears."""
+    track = Track(Pose2D(0.3, 0.2, 0.1), RADIUS)
+    for kind, back, size in (("S", False, 0.9), *drawn, ("S", False, 0.9)):
+        length = size if size > 0.2 else size / 100
+        track.append(((kind, -length if back else length),))
+    path, gears = track.arrays()
+    kept, there, moved = without_jerks(path, gears)
+    assert np.array_equal(kept[[0, -1]], path[[0, -1]])
+    assert {tuple(point) for point in kept} <= {tuple(point) for point in path}
+    assert (np.diff(moved) >= 0).all()
+    assert (moved[0], moved[-1]) == (0, len(kept) - 1)
+    assert there[0] == there[-1] == 1
+    bounds = np.r_[0, np.flatnonzero(np.diff(there)) + 1, len(there)]
+    lengths = np.add.reduceat(np.hypot(*np.diff(kept, axis=0).T), bounds[:-1])
+    assert lengths.min() >= 0.002
+    away = shapely.distance(LineString(kept), shapely.points(path))
+    assert away.max() < 0.004
+    assert np.hypot(*(kept[moved] - path).T).max() < 0.004 * len(bounds)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from vision_scenes import CAMERA, jpeg, photographs, picture, pole, room
 
 from polepilot.core.landmark import SUPPORTED_BITS, LandmarkKind, encode
@@ -200,15 +201,30 @@ def test_a_cover_matters_where_it_makes_one_landmark_of_another() -> None:
         assert [found.id for found in some.detect(image)] == seen, others
 
 
-@pytest.mark.parametrize("unit", [3, 4, 6, 10])
-def test_a_skirting_board_is_behind_the_pole(unit: int) -> None:
-    """As black as the paint, it crosses the pole where another id has a bright bit. It parts the
-    wall from the floor; a branch ends soon, or has the wall below it as well."""
-    for number, bit in ((12, 0), (2, 3), (5, 1)):  # 1100000101011 and so on
-        segment = 3 + 2 * bit
-        for reach, floor, seen in ((200, 120.0, [number]), (200, None, []), (3 * unit, 120.0, [])):
-            image = post(encode(number, 4), unit, unit, band=segment, reach=reach, floor=floor)
-            assert [one.id for one in ALL.detect(image)] == seen, (number, reach, floor)
+ROWS = np.arange(300.0)[:, None]
+
+
+@pytest.mark.parametrize(
+    "wall",
+    [
+        155 + 0 * ROWS,
+        155 - 0.6 * (ROWS - 150),
+        155 - (ROWS - 150),
+        155 + 20 * np.sin(ROWS / 9),
+        np.where(ROWS > 150, 135.0, 155.0),
+        np.where(ROWS > 190, 110.0, 155.0),
+    ],
+    ids=["plain", "shaded", "more shaded", "waves", "two tones", "floor"],
+)
+@pytest.mark.parametrize("unit", [4, 6, 9])
+def test_a_rod_in_front_is_not_taken_for_paint(wall: NDArray[np.float64], unit: int) -> None:
+    """As black as paint, it hides a bright bit; whatever the wall behind looks like."""
+    for number in (3, 7, 9, 11, 13, 14, 15):
+        code = encode(number, 4)
+        for bit in range(4):
+            if number >> bit & 1:
+                image = post(code, unit, bit, wall=wall, rod=3 + 2 * bit)
+                assert {one.id for one in ALL.detect(image)} <= {number}, bit
 
 
 def cut(image: Image, first: int, end: int, lower: float = 0.0) -> list[Detection]:
@@ -306,28 +322,19 @@ def post(
     longer: int = 0,
     board: bool = False,
     bars: bool = True,
-    wall: float = 155.0,
-    band: int | None = None,
-    reach: int = 200,
-    floor: float | None = None,
+    wall: float | NDArray[np.float64] = 155.0,
+    rod: int | None = None,
 ) -> Image:
     """A painted post in front of a grey wall or an orange board.
 
     Args:
         code: from top to bottom, "1" for bright.
-        wall: how bright the wall is, about.
+        wall: how bright the wall is, about; or each of its rows.
         longer: segments of bright paint that follow at either end.
         bars: whether the two segments at either end are painted at all.
-        band: the segment behind which a black band crosses the wall,
-        reach: to so many columns from the middle,
-        floor: and how bright the floor below it is, if there is one.
+        rod: the segment in front of which a black rod crosses the picture.
     """
-    image = np.full((300, 400, 3), (wall - 5, wall, wall + 5))
-    if band is not None:
-        upper = round(150 + (band - len(code) / 2) * unit)
-        if floor is not None:
-            image[upper + unit :] = (floor - 5, floor, floor + 5)
-        image[upper : upper + unit, 200 - reach : 200 + reach] = (20.0, 20.0, 20.0)
+    image = np.zeros((300, 400, 3)) + np.stack([wall - 5, wall + 0, wall + 5], axis=-1)
     if board:
         image[:, 140:260] = (60.0, 135.0, 225.0)
     across = (np.arange(400) - 200.0) / (0.7 * unit)
@@ -341,6 +348,8 @@ def post(
         bright = not 0 <= place < len(code) or code[place] == "1"
         paint = np.array((40.0, 120.0, 235.0) if bright else (20.0, 20.0, 20.0))
         image[row, inside] = paint * shade[:, None]
+    if rod is not None:
+        image[places == rod] = 20.0
     image = np.asarray(cv2.GaussianBlur(image, (0, 0), 0.6))
     image += np.random.default_rng(seed).normal(0, 1.2, image.shape)
     return np.clip(image, 0, 255).astype(np.uint8)

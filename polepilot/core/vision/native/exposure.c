@@ -1,6 +1,7 @@
 /* A picture taken in the dark is made brighter before it is looked at. */
 #include "internal.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 #define APART 8         /* rows and columns from one pixel that is asked to the next, */
@@ -28,6 +29,20 @@ static int brightest(const eye_picture *p, const eye_task *task)
     return level;
 }
 
+/* The brightest pixel of what may be paint, such as that of a landmark that alone is lit. */
+static int brightest_paint(const eye_picture *p, const eye_task *task)
+{
+    int most = 0, coloured = eye_is_coloured(p->channels, task);
+    int channel = p->channels == 3 ? task->high : 0;
+    for (int y = 0; y < p->rows; y++) {
+        const uint8_t *pixel = p->pixels + (ptrdiff_t)y * p->stride;
+        for (int x = 0; x < p->columns; x++, pixel += p->channels)
+            if (pixel[channel] > most && (!coloured || eye_colour(pixel, task) > 4 * EYE_FAINTEST))
+                most = pixel[channel];
+    }
+    return most;
+}
+
 /* Makes a brighter copy of a picture if it is dim: 1, and its pixels have to be freed. 0 if it is
  * not, -1 where there is no memory. */
 int eye_brighten(const eye_picture *p, const eye_task *task, eye_picture *out)
@@ -35,7 +50,10 @@ int eye_brighten(const eye_picture *p, const eye_task *task, eye_picture *out)
     int level = brightest(p, task);
     if (level >= BRIGHT)
         return 0;
-    double times = eye_limit((double)BRIGHT / level, 1, MOST_TIMES);
+    double room = 255.0 / (brightest_paint(p, task) + 1); /* no paint loses its shade */
+    double times = fmin(fmin((double)BRIGHT / level, MOST_TIMES), room);
+    if (times <= 1)
+        return 0;
     uint8_t brighter[256];
     for (int i = 0; i < 256; i++)
         brighter[i] = (uint8_t)eye_limit(times * i + 0.5, 0, 255);

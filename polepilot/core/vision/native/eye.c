@@ -204,10 +204,9 @@ static int examine(const eye_picture *picture, const eye_task *task,
                                   &doubt);
     if (reason != EYE_READ)
         return reason;
-    int behind[EYE_MOST_SEGMENTS];
     if (eye_covered(picture, task, &upright, &scale, &side, out->code, levels, segments,
-                    scale.noise / 2, behind) ||
-        eye_in_front(picture, task, &upright, &scale, &side, out->code, levels, segments, behind))
+                    scale.noise / 2) ||
+        eye_in_front(picture, task, &upright, &scale, &side, out->code, levels, segments))
         return EYE_COVERED;
     out->side_noise = side.noise;
     out->sides = side.sides;

@@ -290,11 +290,10 @@ static double step(const scene *s, const eye_upright *u, int from, int to)
     return room > 0 ? at_most(most / (STEP * room + STEP_SPREAD * s->usual)) : 0;
 }
 
-/* Whether something stands in front of a bit, which makes one landmark of another. ``behind``: the bits
- * beside which something is that stands behind the pole (`eye_covered`). */
+/* Whether something stands in front of a bit, which makes one landmark of another. */
 int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *u,
                  const eye_scale *scale, const eye_side *side, const char *code,
-                 double levels[][EYE_LIGHTS], int segments, const int *behind)
+                 double levels[][EYE_LIGHTS], int segments)
 {
     scene s; /* all but large tables set here */
     s.scale = scale;
@@ -341,7 +340,7 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
                 from--;
             while (code[to] == '0')
                 to++;
-            evidence = (behind[i] ? 0 : goes_on(&s, i, from, to)) + other_black(&s, i) +
+            evidence = goes_on(&s, i, from, to) + other_black(&s, i) +
                        (rows ? step(&s, u, from, to) : 0);
         }
         if (sides && evidence <= ENOUGH)

@@ -341,7 +341,7 @@ def summary(verdicts: Sequence[Verdict], words: Sequence[str] = ()) -> dict[str,
                 if camera_of(verdict.note) == camera and not reading.orange
             )
             for camera in CAMERAS
-        } | {"all": figures(one for one in readings if not one.orange)}
+        }
         places = sorted({math.floor(one.range / STEP) * STEP for one in readings})
         row["distance"] = {
             f"{low:.0f}-{low + STEP:.0f} m": figures(

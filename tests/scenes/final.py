@@ -2,10 +2,6 @@
 
 ``./run soak tests/soak/test_vision.py`` runs it, ``python -m scenes.final`` (in tests/) as well.
 Its pictures begin at seed 700,000; nobody develops a detector on them.
-
-The bounds are for pictures as `polepilot.core.vision.capture` has them made: larger ones, averaged
-down, with or without JPEG 4:2:0. What a sensor gives that has one colour for each pixel of the
-picture itself is told by itself, and counts only where nothing must be misread.
 """
 
 from __future__ import annotations
@@ -21,14 +17,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, get_args
 
-from scenes.campaign import Verdict, camera_of, run, summary, table
+from scenes.campaign import run, summary, table
 from scenes.truth import Family
 
 SEED = 700_000
 FRAMES: Mapping[Family, int] = dict.fromkeys(get_args(Family), 660) | {"empty": 3_000}
-"""Pictures per family, of which 500 at least are no sensor's mosaic."""
-_EVERY_CAMERA: tuple[Family, ...] = ("hidden", "empty")
-"""What must not be misread, whoever took the picture."""
+"""Pictures per family."""
 
 Result = Mapping[str, Any]
 """What `scenes.campaign.summary` gives: figures by family."""
@@ -204,20 +198,10 @@ def campaign(
                 keep=keep or Path(folder),
             )
             for name in detectors:
-                results[name][family] = judged(family, work(detector=name))
+                results[name] |= summary(work(detector=name))
             if family == "hidden" and "default" in detectors:
-                results["default"][APART] = judged(family, work(detector="apart"))
+                results["default"][APART] = summary(work(detector="apart"))[family]
     return results
-
-
-def judged(family: Family, verdicts: Sequence[Verdict]) -> dict[str, Any]:
-    """The figures of the pictures that count, and of every camera by itself."""
-    every: dict[str, Any] = summary(verdicts)[family]
-    counting = [one for one in verdicts if camera_of(one.note) != "mosaic"]
-    if family in _EVERY_CAMERA or not counting:
-        return every
-    row: dict[str, Any] = summary(counting)[family]
-    return row | {"cameras": every["cameras"]}
 
 
 def missed(result: Result) -> list[str]:

@@ -95,7 +95,7 @@ def _cameras(results: Path) -> str:
     rows = []
     for family, words, target in _TARGETS:
         cells = [words, f"≥ {target:g} %"]
-        for camera in (*CAMERAS, "all"):
+        for camera in CAMERAS:
             found = [one and one[family]["cameras"][camera]["read_percent"] for one in measured]
             cells.append(
                 " / ".join(
@@ -109,7 +109,7 @@ def _cameras(results: Path) -> str:
             )
         rows.append(cells)
     head = ["read, darkroom / studio, %", "target", "a larger picture, averaged"]
-    return _rows([*head, "JPEG 4:2:0", "mosaic at this resolution", "all together"], rows)
+    return _rows([*head, "JPEG 4:2:0", "mosaic at this resolution"], rows)
 
 
 def _counts(result: final.Result | None) -> str:

@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 import re
 import xml.etree.ElementTree as ElementTree
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scenes import figures_measuring, figures_seeing, final, resolution, table2
-from scenes.campaign import Reading, Verdict
 from scenes.campaign import camera_of as kind_of_camera
 from scenes.drawing import Axes, Drawing
 from scenes.posed import ORANGE, camera_of, posed
@@ -67,22 +65,6 @@ def test_what_a_camera_has_done_to_colour_is_told_by_the_notes_of_both_programs(
         "ideal sensor, edge, sharpen 0.0, jpeg 0": "sharp",
     }
     assert {note: kind_of_camera(note) for note in said} == said
-
-
-def test_a_mosaic_of_the_picture_itself_is_told_apart() -> None:
-    """And it counts where nothing must be misread."""
-
-    def seen(note: str, read: bool, false: int) -> Verdict:
-        reading = Reading(5.0, False, False, read, *((0.001, 0.0, 1.0, 1.0) if read else ()))
-        return Verdict("clean", 1, (reading,), int(read), 0, 0, false, 1e-3, note)
-
-    verdicts = [seen("blur 0.4", read=True, false=0), seen("mosaic", read=False, false=1)]
-    row = final.judged("clean", verdicts)
-    assert (row["frames"], row["read_percent"], row["false"]) == (1, 100, 0)
-    read = {camera: one.get("read_percent") for camera, one in row["cameras"].items()}
-    assert read == {"sharp": 100, "jpeg": None, "mosaic": 0, "all": 50}
-    empty = final.judged("empty", [replace(one, family="empty") for one in verdicts])
-    assert (empty["frames"], empty["false"]) == (2, 1)
 
 
 def test_pictures_and_links_of_the_page_are_there_and_small() -> None:

@@ -130,9 +130,9 @@ def plan_scan(
     report(0.8, "unreachable parts")
     missing = unreachable_pieces(space, reachable)
     report(0.9, "prediction")
-    left = missed if swept is wanted else None
+    small = wanted.area < _SMALL * options.tool_width**2
+    left = missed if swept is wanted and not small else None
     if left is None:
-        small = wanted.area < _SMALL * options.tool_width**2
         if small or swept is not wanted:
             target = Target(wanted, options.tool_width, _FINE if small else CHORD)
         left = target.missed_area(path)
@@ -278,28 +278,29 @@ def _strokes(
     overlap = _TOUCH if plain else OVERLAP
     if not whole:
         every = (nested_loops(pieces, tool, tolerance, closer, overlap) for closer in spacings)
-        ways = [stretches_over(loops, target.shape, tool) for loops in every]
+        ways = [stretches_over(nest.loops, target.shape, tool) for nest in every]
         loops = min(ways, key=lambda strokes: _cost(strokes, extra))
-        return _completed(loops, space, target, smallest, _always if plain else _long)
+        missed = target.missed(*(stroke.track for stroke in loops))
+        return _completed(loops, missed, space, target, smallest, _always if plain else _long)
     best: list[Stroke] = []
     least = math.inf
     for closer in spacings:
-        loops = nested_loops(pieces, tool, tolerance, closer, overlap)
-        if _cost(loops, extra) >= least:
+        nest = nested_loops(pieces, tool, tolerance, closer, overlap)
+        if _cost(nest.loops, extra) >= least:
             continue  # passes make that no less
-        strokes = _completed(loops, space, target, smallest, passed)
+        missed = nest.missed(target.shape, tool, target.quad_segs)
+        tracks = [stroke.track for stroke in nest.loops]
+        many = plain and closer == 1 and sum(map(len, tracks)) > _SOON[1]
+        if many and missed.area > _SPARSE * target.area and target.area <= _LARGE * tool**2:
+            nest = nested_loops(pieces, tool, tolerance, _CLOSER_THEN, _TOUCH)
+            missed = nest.missed(target.shape, tool, target.quad_segs)
+        strokes = _completed(nest.loops, missed, space, target, smallest, passed)
         cost = _cost(strokes, extra)
         if strokes and cost < least:
             best, least = strokes, cost
-        if target.area > _LARGE * tool**2:
+        if many or target.area > _LARGE * tool**2:
             break  # on a large map the spacing matters less than the time to think about it
-        tracks = [stroke.track for stroke in loops]
-        if plain and closer == 1 and sum(map(len, tracks)) > _SOON[1]:
-            if target.missed_area(*tracks) > _SPARSE * target.area:
-                loops = nested_loops(pieces, tool, tolerance, _CLOSER_THEN, _TOUCH)
-                return _completed(loops, space, target, smallest, passed)
-            break
-        if len(loops) > (_MANY if plain else _MANY_FOR_WHEELS):
+        if len(nest.loops) > (_MANY if plain else _MANY_FOR_WHEELS):
             break
     return best
 
@@ -311,26 +312,25 @@ def _cost(strokes: list[Stroke], extra: float) -> float:
 
 def _completed(
     loops: list[Stroke],
+    missed: MultiPolygon,
     space: FreeSpace,
     target: Target,
     smallest: float,
     passed: Callable[[Polygon, float], bool],
 ) -> list[Stroke]:
-    """Loops with the clean-up passes for those patches that they miss of ``target`` and that are
-    to be ``passed`` over by a tool of some width."""
+    """Loops with the clean-up passes for those patches of what is ``missed`` by them that are to be
+    ``passed`` over by a tool of some width."""
     strokes, tool = list(loops), target.tool
-    for _ in range(1 if passed is long_for_bumps else 2):  # bumps do what passes leave
-        missed: shapely.Geometry = target.shape
-        if strokes:
-            missed = target.missed(*(stroke.track for stroke in strokes))
-            missed = MultiPolygon([p for p in patches_of(missed, smallest) if passed(p, tool)])
-        more = cleanup_strokes(missed, tool, space, smallest)
+    more: list[Stroke] = []
+    for again in range(1 if passed is long_for_bumps else 2):  # bumps do what passes leave
+        if again:
+            missed = target.still_missed(missed, *(stroke.track for stroke in more))
+        patches = [p for p in patches_of(missed, smallest) if not strokes or passed(p, tool)]
+        more = cleanup_strokes(MultiPolygon(patches), tool, space, smallest)
         strokes += more
         if not more:
             break
-    if not strokes:
-        strokes = cleanup_strokes(target.shape, tool, space, 0.0)
-    return strokes
+    return strokes or cleanup_strokes(target.shape, tool, space, 0.0)
 
 
 def _always(patch: Polygon, tool: float) -> bool:
@@ -363,4 +363,4 @@ def _path(
     if options.min_turn_radius <= 0:
         path, parts, missed = sharp_path(runs, space, options, target, notes)
         return path, np.ones(len(path) - 1, np.int8), parts, missed
-    return *driven_path(runs, space, options, target, notes, whole), None
+    return driven_path(runs, space, options, target, notes, whole)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from polepilot.core.geometry import Pose2D, wrap_angle
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 Piece = tuple[str, float]
 """("S" straight, "L" left or "R" right, signed length in metres: backward negative)."""
 Curve = tuple[Piece, ...]
@@ -104,23 +106,44 @@ def sample(
     return points, np.where(length > 0, 1, -1).astype(np.int8), pose
 
 
-def spots(poses: Array, curves: Sequence[Curve], radius: float) -> Array:
-    """Points on curves, N x M x 2, evenly on each piece: where one of them is not free a curve is
-    not. ``poses``: where they begin, N x 3 or for all of them 1 x 3."""
-    x, y, heading = np.broadcast_to(poses, (len(curves), 3)).T
-    found: list[Array] = [np.zeros((len(curves), 0, 2))]
+def columns(curves: Sequence[Curve]) -> tuple[Array, Array]:
+    """Sides of the pieces of curves (1: left, -1: right), and their lengths, metres; N x M each."""
+    most = max(map(len, curves), default=0)
+    filled = [(*curve, *[("S", 0.0)] * (most - len(curve))) for curve in curves]
+    return (
+        np.array([[_SIDES[kind] for kind, _ in curve] for curve in filled]).reshape(
+            len(curves), most
+        ),
+        np.array([[length for _, length in curve] for curve in filled]).reshape(len(curves), most),
+    )
+
+
+def changes(lengths: Array) -> Array:
+    """How often each row of signed lengths changes its gear, entered and left forward."""
+    count, gear = np.zeros(len(lengths)), np.ones(len(lengths))
+    for column in (*lengths.T, np.ones(len(lengths))):
+        new = np.where(np.abs(column) > 1e-6, np.sign(column), gear)
+        count += new != gear
+        gear = new
+    return count
+
+
+def spots(poses: Array, sides: Array, lengths: Array, radius: float) -> Array:
+    """Points on curves (see ``columns``), N x P x 2, evenly on each piece: where one of them is not
+    free a curve is not. ``poses``: where they begin, N x 3 or for all of them 1 x 3."""
+    count, most = lengths.shape
+    x, y, heading = np.broadcast_to(poses, (count, 3)).T
+    found = np.empty((count, most * _SPOTS, 2))
     shares = np.arange(1, _SPOTS + 1) / _SPOTS
-    for index in range(max(map(len, curves), default=0)):
-        pieces = [curve[index] if index < len(curve) else ("S", 0.0) for curve in curves]
-        side = np.array([_SIDES[kind] for kind, _ in pieces])
-        length = np.array([length for _, length in pieces])[:, None] * shares
-        bend = side[:, None] * length / (2 * radius)
+    for piece in range(most):
+        length = lengths[:, piece, None] * shares
+        bend = sides[:, piece, None] * length / (2 * radius)
         chord = length * np.sinc(bend / math.pi)
-        there_x = x[:, None] + chord * np.cos(heading[:, None] + bend)
-        there_y = y[:, None] + chord * np.sin(heading[:, None] + bend)
-        found.append(np.stack([there_x, there_y], axis=2))
-        x, y, heading = there_x[:, -1], there_y[:, -1], heading + 2 * bend[:, -1]
-    return np.concatenate(found, axis=1)
+        there = found[:, piece * _SPOTS : (piece + 1) * _SPOTS]
+        there[:, :, 0] = x[:, None] + chord * np.cos(heading[:, None] + bend)
+        there[:, :, 1] = y[:, None] + chord * np.sin(heading[:, None] + bend)
+        x, y, heading = there[:, -1, 0], there[:, -1, 1], heading + 2 * bend[:, -1]
+    return found
 
 
 def shortest_curves(start: Pose2D, goal: Pose2D, radius: float, change: float) -> list[Curve]:
@@ -132,20 +155,46 @@ def shortest_curves_each(
     ways: Sequence[tuple[Pose2D, Pose2D]], radius: float, change: float, most: int = _MOST
 ) -> list[list[Curve]]:
     """The same for many starts and goals at once, ``most`` for each."""
-    goals = np.array(
-        [
-            (*start.to_local(goal.position), wrap_angle(goal.heading - start.heading) * radius)
-            for start, goal in ways
-        ]
-    )
-    return [
-        [tuple((kind, length * radius) for kind, length in curve) for curve in curves]
-        for curves in _curves(np.round(goals / radius, 9), round(change / radius, 6), most)
-    ]
+    poses = np.array([(tuple(start), tuple(goal)) for start, goal in ways]).reshape(-1, 2, 3)
+    found = best_curves(poses[:, 0], poses[:, 1], radius, change, most)
+    every: list[list[Curve]] = [[] for _ in ways]
+    rows = zip(found.of.tolist(), found.words.tolist(), found.lengths.tolist(), strict=True)
+    for way, word, lengths in rows:
+        pieces = zip(_WORDS[word], lengths, strict=False)
+        every[way].append(tuple([piece for piece in pieces if piece[1]]))
+    return every
 
 
-def _curves(goals: Array, change: float, most: int) -> list[list[Curve]]:
-    """The ``most`` best for radius 1 to each of N goals x, y, heading."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Curves:
+    """Many curves between poses: those of one pair of poses after another, the best first."""
+
+    of: Indices
+    """Between which pair of poses each leads."""
+    words: Indices
+    lengths: Array
+    """N x 5, metres; of pieces that a curve does not have 0."""
+
+    @property
+    def sides(self) -> Array:
+        """The sides of its pieces, N x 5; 1: left, 0: straight on, -1: right."""
+        return np.asarray(_KINDS[self.words])
+
+
+def best_curves(
+    starts: Array, goals: Array, radius: float, change: float, most: int = _MOST
+) -> Curves:
+    """The ``most`` best curves from each of N starts x, y, heading to its goal, length plus
+    ``change`` metres per gear."""
+    off, cos, sin = goals - starts, np.cos(starts[:, 2]), np.sin(starts[:, 2])
+    ahead = cos * off[:, 0] + sin * off[:, 1]
+    aside = cos * off[:, 1] - sin * off[:, 0]
+    local = np.stack([ahead / radius, aside / radius, _wrapped(off[:, 2])], axis=1)
+    return _curves(np.round(local, 9), round(change / radius, 6), most, radius)
+
+
+def _curves(goals: Array, change: float, most: int, radius: float) -> Curves:
+    """The ``most`` best for radius 1 to each of N goals x, y, heading; then of another radius."""
     with np.errstate(invalid="ignore"):  # what is no number is no curve
         kinds, lengths = _words(*goals.T)
         cost = np.abs(lengths).sum(axis=2)
@@ -156,21 +205,20 @@ def _curves(goals: Array, change: float, most: int) -> list[list[Curve]]:
             cost += change * ((forward != 0) & (way != forward))
             forward = way
         good = _arrive(kinds, lengths, goals) & (cost > 1e-7)
-    cost = np.where(good, np.round(cost, 9), np.inf)
-    found: list[list[Curve]] = []
-    orders = np.argsort(cost, axis=0, kind="stable")
-    counts = good.sum(axis=0).tolist()
-    for goal, count in enumerate(counts):
-        best: dict[tuple[Piece, ...], Curve] = {}
-        words = orders[:count, goal]
-        for word, row in zip(words.tolist(), lengths[words, goal].tolist(), strict=True):
-            pieces = zip(_WORDS[word], row, strict=False)
-            curve = tuple([piece for piece in pieces if not -1e-7 <= piece[1] <= 1e-7])
-            best.setdefault(tuple([(kind, round(length, 6)) for kind, length in curve]), curve)
-            if len(best) == most:
-                break
-        found.append(list(best.values()))
-    return found
+    words, of = np.nonzero(good)
+    lengths, cost = lengths[words, of], np.round(cost[words, of], 9)
+    lengths = np.where(np.abs(lengths) <= 1e-7, 0.0, lengths)
+    # Words with pieces of no length may be the same curve: it bends the same way everywhere.
+    marks = np.cumsum(np.abs(lengths), axis=1) ** 2
+    spans = np.diff(marks, axis=1, prepend=0.0)
+    bend = np.round((spans * (kinds[words] + 0.37 * np.sign(lengths))).sum(axis=1), 5)
+    order = np.lexsort((words, bend, cost, of))
+    keys = np.stack([of, cost, bend])[:, order]
+    new = order[np.r_[True, (keys[:, 1:] != keys[:, :-1]).any(axis=0)][: len(order)]]
+    new = new[np.lexsort((words[new], cost[new], of[new]))]
+    rank = np.arange(len(new)) - np.searchsorted(of[new], of[new])
+    new = new[rank < most]
+    return Curves(of[new], words[new], lengths[new] * radius)
 
 
 def _arrive(kinds: Array, lengths: Array, goals: Array) -> NDArray[np.bool_]:
@@ -191,6 +239,8 @@ def _arrive(kinds: Array, lengths: Array, goals: Array) -> NDArray[np.bool_]:
 _FAMILIES = ("LSL", "LSR", "LRL", "LRLR", "LRLR", "LRSL", "LRSR", "LRSLR")
 _LONGEST = 5
 _SIDES = {"L": 1.0, "R": -1.0, "S": 0.0}
+KIND = {side: kind for kind, side in _SIDES.items()}
+"""Which kind of piece bends to which side."""
 _MIRRORED = str.maketrans("LR", "RL")
 _FORMS = tuple(itertools.product((False, True), (1.0, -1.0), (1.0, -1.0)))
 """Each family is driven as it is or from its end, forward or backward, and mirrored."""

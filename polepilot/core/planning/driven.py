@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely import MultiPolygon
 
 from polepilot.core.errors import PlanError
 from polepilot.core.geometry import Pose2D, wrap_angle
@@ -26,7 +27,8 @@ from polepilot.core.planning.wording import in_words
 
 Gears = NDArray[np.int8]
 Parts = tuple[PlanPart, ...]
-Driven = tuple[Points, Gears, Parts]
+Driven = tuple[Points, Gears, Parts, MultiPolygon]
+"""A path, its gears and parts, and what it misses."""
 
 _LEAST = 0.0065
 """Missed patches smaller than this share of the tool's square are not visited."""
@@ -47,22 +49,24 @@ def driven_path(
     target: Target,
     notes: list[str],
     whole: bool = True,
-) -> Driven:
-    """Followable by a steered wheel; what its curves miss is visited at the end.
+) -> tuple[Points, Gears, Parts, float]:
+    """Followable by a steered wheel; what its curves miss is visited at the end. And how much of
+    the target is missed then, m².
 
     ``whole``: else the target is what was left before, of which crumbs are left again.
     """
     driver, recorder = _from_start(runs, space, options, target)
     path, gear = driver.track.arrays()
-    parts = tuple(recorder.parts)
+    driven = path, gear, tuple(recorder.parts), target.missed(path)
     if len(path) > 1:
         smallest = (_LEAST if whole else _CRUMB) * target.tool**2
         radius = driver.track.radius
-        path, gear, parts = _visited(path, gear, parts, space, radius, target, smallest)
-        longer = _passed(path, gear, parts, driver, space, options, target)
+        driven = _visited(*driven, space, radius, target, smallest)
+        longer = _passed(*driven, driver, space, options, target)
         if longer is not None:
-            path, gear, parts = _visited(*longer, space, radius, target, smallest)
-    left = target.missed_area(path)
+            driven = _visited(*longer, space, radius, target, smallest)
+    path, gear, parts, missed = driven
+    left = float(missed.area)
     if left > max(0.02 * target.area, _SAID):
         notes.append(
             f"{left:.2f} m² is missed: no way was found there with a turning radius of "
@@ -75,7 +79,7 @@ def driven_path(
         )
     path, gear, moved = without_jerks(path, gear)
     path, gear, there = without_crumbs(path, gear, space)
-    return path, gear, _moved_parts(parts, there[moved])
+    return path, gear, _moved_parts(parts, there[moved]), left
 
 
 def _from_start(
@@ -110,6 +114,7 @@ def _visited(
     path: Points,
     gear: Gears,
     parts: Parts,
+    missed: MultiPolygon,
     space: FreeSpace,
     radius: float,
     target: Target,
@@ -119,16 +124,19 @@ def _visited(
     enough = _ENOUGH * target.area
     for _ in range(2):
         before = len(path)
-        path, gear, parts = with_visits(path, gear, parts, target, space, radius, smallest, enough)
+        path, gear, parts, missed = with_visits(
+            path, gear, parts, target, space, radius, smallest, enough, missed
+        )
         if len(path) == before:
             break
-    return path, gear, parts
+    return path, gear, parts, missed
 
 
 def _passed(
     path: Points,
     gear: Gears,
     parts: Parts,
+    missed: MultiPolygon,
     driver: Driver,
     space: FreeSpace,
     options: PlanOptions,
@@ -138,7 +146,7 @@ def _passed(
 
     ``driver`` stands where the path ends.
     """
-    more = cleanup_strokes(target.missed(path), target.tool, space, _WORTH * target.tool**2)
+    more = cleanup_strokes(missed, target.tool, space, _WORTH * target.tool**2)
     if not more:
         return None
     last, recorder = driver.track.last, Recorder()
@@ -147,7 +155,7 @@ def _passed(
     _drive(driver, chained(more, driver.track.pose.position), recorder, options)
     points, gears = driver.track.arrays()
     longer = np.vstack([path, points[last + 1 :]]), np.concatenate([gear, gears[last:]])
-    return *longer, tuple(recorder.parts)
+    return *longer, tuple(recorder.parts), target.still_missed(missed, points[last:])
 
 
 def _moved_parts(parts: Parts, moved: NDArray[np.intp]) -> Parts:

@@ -9,8 +9,9 @@ which is always possible. What cannot be connected at all is left out, and said.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import shapely
@@ -20,17 +21,19 @@ from polepilot.core import geometry
 from polepilot.core.geometry import Pose2D, angle_between
 from polepilot.core.planning.curves import (
     CHANGE,
+    KIND,
     Curve,
+    best_curves,
+    changes,
     curve_cost,
     curve_length,
     joined,
     sample,
-    shortest_curves_each,
     spots,
 )
 from polepilot.core.planning.space import FreeSpace
 from polepilot.core.planning.track import PLAIN, Track
-from polepilot.core.planning.turns import prepare, turns_round
+from polepilot.core.planning.turns import Turn, prepare, turns_round
 from polepilot.core.planning.ways import way_to_line
 
 Points = NDArray[np.float64]
@@ -50,8 +53,9 @@ _BRIEF = 0.45
 _MOST_TRIES = 10
 _MOST_ZIGZAGS = 2
 """To so many legs a way to and fro is looked for from one place: who gets to none is stuck."""
+_SOME = 12
 _AT_ONCE = 24
-"""So many curves are looked at at once."""
+"""So many ways round a corner, and so many curves, are looked at at once."""
 _CURVES = 6
 """So many curves to a pose are looked at."""
 _ALONG = (1.45, 1.6, 2.0, 3.0)
@@ -119,28 +123,22 @@ class Driver:
         """Gets onto a loop by one curve; the loop from there on. None, and nothing is driven, if it
         is best entered where it begins."""
         here = self.track.pose.position
-        place, heading = _begin(loop, 0)
-        if math.dist(here, place) < 1e-6:
+        if math.dist(here, loop[0]) < 1e-6:
             return None
-        direct = self._direct(place, heading)
-        least = math.inf if direct is None else direct[0] - 1e-6
-        best: tuple[Curve, Points] | None = None
+        entries = [loop]
         marks = np.r_[0.0, np.cumsum(np.hypot(*np.diff(loop, axis=0).T))]
         beside = float(shapely.LineString(loop).project(shapely.Point(here)))
         for share in _ALONG:
             begun = _begun_at(loop, marks, (beside + share * self._radius) % marks[-1])
-            place, heading = _begin(begun, 0)
             if math.dist(begun[0], begun[1]) < self._radius:
                 continue  # a corner that follows needs its room
-            if math.dist(here, place) > 4 * self._radius:
-                continue
-            direct = self._direct(place, heading)
-            if direct is not None and direct[0] < least:
-                least, best = direct[0] - 1e-6, (direct[1], begun)
-        if best is None:
+            if math.dist(here, begun[0]) <= 4 * self._radius:
+                entries.append(begun)
+        found = self._direct([_begin(entry, 0) for entry in entries])
+        if found is None or found[0] == 0:
             return None
-        self.track.append(best[0])
-        return best[1]
+        self.track.append(found[2])
+        return entries[found[0]]
 
     def head_for(self, place: geometry.Point) -> bool:
         """Goes to ``place``, looking wherever: one curve and straight on, or what is cheaper.
@@ -224,54 +222,53 @@ class Driver:
         pose = self.track.pose
         direct = None
         if heading is not None and math.dist(pose.position, place) < 8 * self._radius:
-            direct = self._direct(place, heading)
+            direct = self._direct([(place, heading)])
         far = math.dist(pose.position, place) > 4 * self._radius or heading is None
         if direct is not None and not far:
-            self.track.append(direct[1])
+            self.track.append(direct[2])
             return True
         saved = self.track.save()
         if self._along_path(place, heading) and (
-            direct is None or self.track.cost_since(saved) <= direct[0]
+            direct is None or self.track.cost_since(saved) <= direct[1]
         ):
             return True
         self.track.restore(saved)  # it may have got half-way
         if direct is None:
             return False
-        self.track.append(direct[1])
+        self.track.append(direct[2])
         return True
 
-    def _direct(self, place: geometry.Point, heading: float) -> tuple[float, Curve] | None:
-        """The cheapest curve to a pose, perhaps from some way back or by way of a point ahead."""
+    def _direct(
+        self, goals: Sequence[tuple[geometry.Point, float]]
+    ) -> tuple[int, float, Curve] | None:
+        """To which of some places and headings the cheapest curve leads, perhaps from some way back
+        or by way of a point ahead; what it costs; and the curve."""
         pose = self.track.pose
-        goal = Pose2D(*place, heading)
-        found: list[tuple[float, Curve]] = []
-        between: list[tuple[Pose2D, Pose2D]] = []
-        beyond: list[tuple[float, float]] = []
+        ends = np.array([(*place, heading) for place, heading in goals])
         backs = [0.0, *(b for b in (0.5 * self._radius, self._radius) if b <= self.track.straight)]
-        for back in backs:
-            here = Pose2D(*pose.ahead(-back), pose.heading)
-            for ahead in (share * self._radius for share in _AHEAD):
-                between.append((here, Pose2D(*goal.ahead(ahead), heading)))
-                beyond.append((back, ahead))
-        every = shortest_curves_each(between, self._radius, CHANGE, _CURVES)
-        for (back, ahead), curves in zip(beyond, every, strict=True):
-            for curve in curves:
-                whole = joined((("S", -back), *curve, ("S", -ahead)))
-                found.append((curve_cost(whole), whole))
-        found.sort(key=lambda entry: entry[0])
-        return next(
-            (entry for entry in self._likely(pose, found) if self._fits(pose, entry[1])), None
-        )
+        ways = np.array(list(itertools.product(range(len(ends)), backs, _AHEAD)))
+        of, back, beyond = ways[:, 0].astype(np.intp), ways[:, 1], ways[:, 2] * self._radius
+        starts = _ahead(np.array([pose]), -back)
+        found = best_curves(starts, _ahead(ends[of], beyond), self._radius, CHANGE, _CURVES)
+        nothing = np.zeros(len(found.of))
+        sides = np.column_stack([nothing, found.sides, nothing])
+        lengths = np.column_stack([-back[found.of], found.lengths, -beyond[found.of]])
+        cost = np.abs(lengths).sum(axis=1) + CHANGE * changes(lengths)
+        order = np.argsort(np.round(cost, 9), kind="stable")
+        for row in self._likely(pose, sides[order], lengths[order]):
+            kinds = zip(sides[order[row]].tolist(), lengths[order[row]].tolist(), strict=True)
+            curve = joined(tuple((KIND[side], length) for side, length in kinds))
+            if self._fits(pose, curve):
+                return int(of[found.of[order[row]]]), float(cost[order[row]]), curve
+        return None
 
-    def _likely(
-        self, pose: Pose2D, found: list[tuple[float, Curve]]
-    ) -> Iterator[tuple[float, Curve]]:
+    def _likely(self, pose: Pose2D, sides: Points, lengths: Points) -> Iterator[int]:
         """Those of some curves of which some points are free, which is soon looked at."""
-        for first in range(0, len(found), _AT_ONCE):
-            some = found[first : first + _AT_ONCE]
-            points = spots(np.array([pose]), [curve for _, curve in some], self._radius)
-            free = self._space.holds_each(points.reshape(-1, 2)).reshape(len(some), -1)
-            yield from (some[row] for row in np.flatnonzero(free.all(axis=1)).tolist())
+        for first in range(0, len(sides), _AT_ONCE):
+            some = slice(first, first + _AT_ONCE)
+            points = spots(np.array([pose]), sides[some], lengths[some], self._radius)
+            free = self._space.holds_each(points.reshape(-1, 2)).reshape(len(points), -1)
+            yield from (first + np.flatnonzero(free.all(axis=1))).tolist()
 
     def _along_path(self, place: geometry.Point, heading: float | None) -> bool:
         """Along the shortest path, all of its corners turned; leaves the track half-way if not."""
@@ -373,13 +370,27 @@ class Driver:
                 options.sort(key=lambda way: way.cost - 20 * min(way.cut, 0.5) ** 2)
             else:
                 options.sort(key=lambda way: (way.cut > cut, way.cost))
-            for way in options[:_MOST_TURNS]:
-                points = np.vstack([start, way.points @ turned + corner_here])
-                if self._space.holds_points(points):
-                    self.track.append(way.after(before))
-                    self.track.pose = Pose2D(*self.track.pose.position, heading)
-                    return True
+            for way in self._free(options[:_MOST_TURNS], start, corner_here, turned):
+                self.track.append(way.after(before))
+                self.track.pose = Pose2D(*self.track.pose.position, heading)
+                return True
         return False
+
+    def _free(
+        self, ways: list[Turn], start: Points, corner: Points, turned: Points
+    ) -> Iterator[Turn]:
+        """Those of some ways round a corner that stay in the free space; ``turned``: the direction
+        of the way in, and what is to the left of it."""
+        for first in range(0, len(ways), _SOME):
+            some = ways[first : first + _SOME]
+            sizes = np.array([len(way.points) for way in some], dtype=np.intp)
+            points = np.concatenate([way.points for way in some]) @ turned + corner
+            ends: NDArray[np.intp] = np.cumsum(sizes)
+            free = np.logical_and.reduceat(self._space.holds_each(points), ends - sizes)
+            for index in np.flatnonzero(free).tolist():
+                line = np.vstack([start, points[ends[index] - sizes[index] : ends[index]]])
+                if self._space.holds(shapely.LineString(line)):
+                    yield some[index]
 
     def _resume(self, points: Points, index: int) -> int | None:
         """Gets back onto ``points`` at the corner ``index`` or later; which corner comes next.
@@ -457,6 +468,14 @@ def _begun_at(loop: Points, marks: Points, first: float) -> Points:
     share = (first - marks[index - 1]) / (marks[index] - marks[index - 1])
     place = loop[index - 1] + share * (loop[index] - loop[index - 1])
     return np.vstack([place, loop[index:], loop[1:index], place])
+
+
+def _ahead(poses: Points, distances: Points) -> Points:
+    """Poses, N x 3, moved straight ahead."""
+    x, y, heading = np.broadcast_to(poses, (len(distances), 3)).T
+    return np.stack(
+        [x + distances * np.cos(heading), y + distances * np.sin(heading), heading], axis=1
+    )
 
 
 def _begin(points: Points, leg: int) -> tuple[geometry.Point, float]:

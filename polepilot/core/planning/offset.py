@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import LineString, Polygon
+from shapely import LineString, MultiPolygon, Polygon
 
 from polepilot.core.planning.patches import patches_of
 from polepilot.core.planning.space import FreeSpace, polygons, quadrant
@@ -52,13 +52,44 @@ class Stroke:
         return LineString(self.track)
 
 
+@dataclass(slots=True, eq=False)
+class Nest:
+    """Nested loops, and the shapes whose outlines they are."""
+
+    loops: list[Stroke]
+    shapes: list[MultiPolygon]
+    inside: list[int]
+    """Inside of which of the shapes each is; -1: it is an outermost one."""
+
+    def missed(self, area: shapely.Geometry, tool: float, quad_segs: int) -> MultiPolygon:
+        """What a tool misses of an area if it is driven along all loops, to a millimetre or two.
+
+        Between a loop and those inside of it nothing else is swept, so no pieces of tracks have to
+        be united. ``quad_segs``: chords per quarter of a circle.
+        """
+        shapes = np.array(self.shapes, dtype=object)
+        filled = shapely.buffer(shapes, tool / 2, quad_segs=quad_segs)
+        hollow = shapely.buffer(shapes, -tool / 2, quad_segs=quad_segs)
+        left: list[Polygon] = []
+        inside = np.array(self.inside)
+        order = np.argsort(inside, kind="stable")
+        ends = np.searchsorted(inside[order], np.arange(-1, len(shapes)), side="right")
+        for index, shape in enumerate([area, *hollow], -1):
+            first, last = (0 if index < 0 else ends[index]), ends[index + 1]
+            children = filled[order[first:last]]
+            if not shape.is_empty:
+                rest = shape.difference(shapely.union_all(children)) if len(children) else shape
+                left += polygons(rest)
+        return MultiPolygon(left)
+
+
 def nested_loops(
     pieces: list[Polygon],
     tool_width: float,
     tolerance: float,
     closer: float = 1.0,
     overlap: float = OVERLAP,
-) -> list[Stroke]:
+) -> Nest:
     """The outlines of ``pieces``, and loops inside of them a little less than a tool width apart.
 
     ``tolerance``: how far inner loops may be from the exact offset, metres, where that saves
@@ -71,24 +102,29 @@ def nested_loops(
         joins: dict[str, Any] = {"join_style": "round"}
     else:
         joins = {"join_style": "mitre", "mitre_limit": 1.5}
-    loops: list[Stroke] = []
+    nest = Nest([], [], [])
     for piece in pieces:
         largest = tool_width * (1 - overlap)
         step = closer * largest if closer > 0 else _fitted_step(piece, tool_width, largest)
-        level = [piece]
+        level = [(piece, -1)]
         depth = 0
         while level:
-            following: list[Polygon] = []
-            for polygon in level:
+            following: list[tuple[Polygon, int]] = []
+            for polygon, outside in level:
                 if depth == 0 or not polygon.buffer(-_THIN * tool_width / 2).is_empty:
-                    loops += _rings(polygon, depth, tolerance)
+                    driven = _driven(polygon, depth, tolerance)
+                    nest.loops += _rings(driven, depth)
+                    nest.shapes.append(MultiPolygon(driven))
+                    nest.inside.append(outside)
                     inner = polygon.buffer(-step, quad_segs=quadrant(step, 0.0005), **joins)
                     following += [
-                        part.simplify(0.0005) for part in polygons(inner) if part.area > 1e-4
+                        (part.simplify(0.0005), len(nest.shapes) - 1)
+                        for part in polygons(inner)
+                        if part.area > 1e-4
                     ]
-            level = [part for part in following if part.is_valid and not part.is_empty]
+            level = [entry for entry in following if entry[0].is_valid and not entry[0].is_empty]
             depth += 1
-    return loops
+    return nest
 
 
 def _corner_count(shape: shapely.Geometry) -> int:
@@ -104,7 +140,8 @@ def _fitted_step(piece: Polygon, tool_width: float, largest: float) -> float:
     return max(0.75 * largest, inside / math.ceil(inside / largest))
 
 
-def _rings(polygon: Polygon, depth: int, tolerance: float) -> list[Stroke]:
+def _driven(polygon: Polygon, depth: int, tolerance: float) -> list[Polygon]:
+    """A polygon with fewer corners where it need not be exact."""
     if depth == 0:
         inner = polygon
         few = polygon.buffer(-_COARSE, join_style="mitre").simplify(_COARSE)
@@ -112,10 +149,12 @@ def _rings(polygon: Polygon, depth: int, tolerance: float) -> list[Stroke]:
             inner = few  # a wheel follows few corners better than many
     else:
         inner = polygon.simplify(tolerance)
-    if inner.is_empty or not inner.is_valid:
-        inner = polygon
+    return polygons(polygon if inner.is_empty or not inner.is_valid else inner)
+
+
+def _rings(driven: list[Polygon], depth: int) -> list[Stroke]:
     found: list[Stroke] = []
-    for part in polygons(inner):
+    for part in driven:
         for ring in (part.exterior, *part.interiors):
             points = np.asarray(ring.coords, dtype=float)[:-1, :2]
             if len(points) >= 3 and ring.length > 0.02:

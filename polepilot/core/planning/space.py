@@ -29,6 +29,14 @@ and of the digits in which it is written, m."""
 _TOLERANCES = (0.005, 0.02, 0.05, 0.1, 0.2)
 """How exactly corners are taken when a way is looked for, m."""
 _MOST_CORNERS = 400
+_SQUARE = 0.05
+_MOST_SQUARES = 1_000_000
+"""Side of the squares in which points are looked up, m; it is longer where there would be more."""
+_FEW = 8
+"""Fewer points than this are looked at one by one."""
+_RIM, _UNKNOWN, _INSIDE, _OUTSIDE = range(4)
+"""What is known of such a square."""
+_AROUND = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
 POLE_GAP = 0.01
 """A pole whose surface is farther than this from everything stands free, m."""
 
@@ -44,6 +52,38 @@ class _Graph:
     arms: NDArray[np.float64]
     """N x 2 x 2: from each corner along its two sides."""
     seen: dict[int, tuple[NDArray[np.intp], NDArray[np.float64]]] = field(default_factory=dict)
+
+
+class _Squares:
+    """Which points a shape holds, square by square: only of those through which its outline runs
+    each point is looked at, of the others the first."""
+
+    def __init__(self, shape: shapely.Geometry) -> None:
+        x0, y0, x1, y1 = shape.bounds
+        self._shape = shape
+        self._side = side = max(_SQUARE, math.sqrt((x1 - x0) * (y1 - y0) / _MOST_SQUARES))
+        self._origin = np.array([x0, y0]) - 2 * side
+        self._last = np.ceil((np.array([x1, y1]) - self._origin) / side).astype(np.intp) + 2
+        self._state = np.full(int(np.prod(self._last + 1)), _UNKNOWN, np.int8)
+        rim = shapely.get_coordinates(shapely.segmentize(shape.boundary, side / 2))
+        near = (((rim - self._origin) / side).astype(np.intp)[:, None] + _AROUND).reshape(-1, 2)
+        self._state[self._number(near)] = _RIM
+
+    def _number(self, squares: NDArray[np.intp]) -> NDArray[np.intp]:
+        return np.asarray(squares[:, 0] * (self._last[1] + 1) + squares[:, 1])
+
+    def hold(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which of N x 2 points are in the shape."""
+        squares = ((points - self._origin) / self._side).clip(0, self._last).astype(np.intp)
+        numbers = self._number(squares)
+        state = self._state[numbers]
+        inside = state == _INSIDE
+        ask = np.flatnonzero(state <= _UNKNOWN)
+        if len(ask):
+            inside[ask] = shapely.intersects_xy(self._shape, *points[ask].T)
+            new = ask[state[ask] == _UNKNOWN]
+            self._state[numbers[new]] = np.where(inside[new], _INSIDE, _OUTSIDE)
+        return np.asarray(inside)
 
 
 @dataclass(slots=True, eq=False)
@@ -65,12 +105,15 @@ class FreeSpace:
     """Whether nobody has said where to start."""
     notes: list[str] = field(default_factory=list)
     _loose: Polygon = field(init=False)
+    _squares: _Squares | None = field(init=False)
+    """Made when many points are asked for the first time."""
     _graphs: list[_Graph] = field(init=False, default_factory=list)
     """Coarse ones first; each is made when the one before it knows no way."""
 
     def __post_init__(self) -> None:
         self._loose = self.polygon.buffer(SLACK, join_style="mitre")
         shapely.prepare(self._loose)
+        self._squares = None
 
     def holds(self, line: shapely.Geometry) -> bool:
         """Whether the centre may move along all of ``line``."""
@@ -78,13 +121,17 @@ class FreeSpace:
 
     def holds_points(self, points: NDArray[np.float64]) -> bool:
         """Whether the centre may move along the line through N x 2 ``points``."""
-        if not shapely.intersects_xy(self._loose, points[:, 0], points[:, 1]).all():
+        if not self.holds_each(points).all():
             return False
         return len(points) < 2 or self.holds(LineString(points))
 
     def holds_each(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether the centre may be at each of N x 2 ``points``."""
-        return np.asarray(shapely.intersects_xy(self._loose, points[:, 0], points[:, 1]))
+        if self._squares is None:
+            if len(points) < _FEW:
+                return np.asarray(shapely.intersects_xy(self._loose, points[:, 0], points[:, 1]))
+            self._squares = _Squares(self._loose)
+        return self._squares.hold(points)
 
     def reachable(self) -> MultiPolygon:
         """The union of the clearance discs whose centres are in ``polygon``."""

@@ -31,6 +31,8 @@ _SAME = 1e-6
 """Bands whose keys differ by less than this are the same."""
 _MOST_TILES = 1000
 """So many in a row at most."""
+_BESIDE = 0.001
+"""Of what bands sweep beside a shape that they are taken off so much is looked at, metres."""
 _POLYGON = 3
 
 
@@ -51,7 +53,8 @@ class Target:
         boxes = shapely.box(*(self._low - grow).T, *(self._high + grow).T)
         self._tree = shapely.STRtree(boxes)
         self._error = error
-        self._round = Footprint(tool / 2, error).quadrant
+        self.quad_segs = Footprint(tool / 2, error).quadrant
+        """Chords per quarter of the disc."""
         self._known: dict[tuple[int, bytes], shapely.Geometry] = {}
         self._asked: list[bytes] = []
         """What was asked last, and the answer: it is often asked again."""
@@ -71,6 +74,20 @@ class Target:
         edges = shapely.set_precision(parts[areal & ~inside & thick], _GRID)
         joined = shapely.disjoint_subset_union_all(edges)
         return MultiPolygon([*parts[areal & (inside | ~thick)].tolist(), *polygons(joined)])
+
+    def still_missed(self, missed: shapely.Geometry, *lines: Points) -> MultiPolygon:
+        """What of ``missed`` no disc along one of the lines sweeps either."""
+        parts = np.array(polygons(missed), dtype=object)
+        bands = bands_of(lines, self.tool / 2, self.quad_segs, self._error)
+        found, of = shapely.STRtree(parts).query(bands.shapes, predicate="intersects")
+        order = np.argsort(of, kind="stable")
+        found, of = found[order], of[order]
+        for near in np.split(np.arange(len(of)), np.flatnonzero(np.diff(of)) + 1):
+            if len(near):
+                parts[of[near[0]]] = _without(
+                    parts[of[near[0]]], bands, found[near], self.quad_segs
+                )
+        return MultiPolygon([piece for part in parts for piece in polygons(part)])
 
     def missed_area(self, *lines: Points) -> float:
         """Its area, m²."""
@@ -95,7 +112,7 @@ class Target:
         asked = [line.tobytes() for line in lines]
         if asked == self._asked:
             return self._answer
-        bands = bands_of(lines, self.tool / 2, self._round, self._error)
+        bands = bands_of(lines, self.tool / 2, self.quad_segs, self._error)
         found, tiles = self._tree.query(bands.tracks, predicate="intersects")
         keys = np.floor(bands.keys_near(found, self._low[tiles], self._high[tiles]) / _SAME + 0.3)
         order = np.lexsort((*keys.T, tiles))  # the same ones in any order leave the same
@@ -105,19 +122,27 @@ class Target:
             if len(near):
                 tile, key = int(tiles[near[0]]), keys[near].tobytes()
                 if (tile, key) not in self._known:
-                    self._known[tile, key] = self._without(tile, bands, found[near])
+                    self._known[tile, key] = _without(
+                        self._tiles[tile], bands, found[near], self.quad_segs
+                    )
                 left[tile] = self._known[tile, key]
         self._asked, self._answer = asked, left
         return left
 
-    def _without(self, tile: int, bands: Bands, near: Indices) -> shapely.Geometry:
-        """A tile without what is swept by some bands."""
-        try:
-            swept = shapely.union_all(bands.shapes[near])
-            return shapely.difference(self._tiles[tile], swept)
-        except shapely.GEOSException:  # corners nearly coincide; whole capsules have none in common
-            swept = shapely.union_all(bands.capsules(near, self._round))
-            return shapely.difference(self._tiles[tile], swept)
+
+def _without(
+    shape: shapely.Geometry, bands: Bands, near: Indices, quad_segs: int
+) -> shapely.Geometry:
+    """A shape without what is swept by some bands."""
+    # What lies beside the shape is cut away first: there would be more corners to think about.
+    x0, y0, x1, y1 = shape.bounds
+    box = (x0 - _BESIDE, y0 - _BESIDE, x1 + _BESIDE, y1 + _BESIDE)
+    try:
+        swept = shapely.union_all(shapely.clip_by_rect(bands.shapes[near], *box))
+        return shapely.difference(shape, swept)
+    except shapely.GEOSException:  # corners nearly coincide; whole capsules have none in common
+        swept = shapely.union_all(bands.capsules(near, quad_segs))
+        return shapely.difference(shape, swept)
 
 
 def _tiles(shape: shapely.Geometry, side: float) -> list[shapely.Geometry]:

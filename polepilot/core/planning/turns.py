@@ -17,6 +17,8 @@ from polepilot.core.geometry import Pose2D, wrap_angle
 from polepilot.core.planning.curves import (
     CHANGE,
     Curve,
+    changes,
+    columns,
     joined,
     sample,
     shortest_curves_each,
@@ -153,7 +155,7 @@ def _left_turns(
     first, last = legs * np.array([place[:2] for _, place, _ in found]).reshape(-1, 2).T
     visit, finish = np.array([place[2:] for _, place, _ in found], bool).reshape(-1, 2).T
     finish = finish | (last < 0)  # what lies before the corner must be free as well
-    sides, lengths = _columns([curve for _, _, curve in found])
+    sides, lengths = columns([curve for _, _, curve in found])
     # What a curve leaves out of the legs: the way in up to the corner, the way out from there on.
     shares = np.array([0.0, 0.25, 0.5, 0.75])[:, None]
     beyond = np.maximum(shares, shares[1])
@@ -167,7 +169,7 @@ def _left_turns(
     # Ten metres before the corner, where it is driven to first, or as far as the turn begins.
     begin = np.where(visit, 10.0, 10.0 + first)
     pieces = np.column_stack([begin, np.where(visit, first, 0.0), lengths, end])
-    cost = np.abs(pieces).sum(axis=1) + CHANGE * _changes(pieces)
+    cost = np.abs(pieces).sum(axis=1) + CHANGE * changes(pieces)
     cost = np.round(cost + 20 * np.minimum(cut, 0.5) ** 2 - 10.0 - stop, 9)
     ways: list[list[Turn]] = [[] for _ in turns]
     for row in np.argsort(cost, kind="stable").tolist():
@@ -184,26 +186,6 @@ def _left_turns(
             )
         )
     return list(map(tuple, ways))
-
-
-def _columns(curves: list[Curve]) -> tuple[Points, Points]:
-    """Sides of the pieces of curves (1: left, -1: right), and their lengths; N x 5 each."""
-    sides = {"L": 1.0, "R": -1.0, "S": 0.0}
-    filled = [(*curve, *[("S", 0.0)] * (5 - len(curve))) for curve in curves]
-    return (
-        np.array([[sides[kind] for kind, _ in curve] for curve in filled]).reshape(-1, 5),
-        np.array([[length for _, length in curve] for curve in filled]).reshape(-1, 5),
-    )
-
-
-def _changes(pieces: Points) -> Points:
-    """How often each row of signed lengths changes its gear, entered and left forward."""
-    count, gear = np.zeros(len(pieces)), np.ones(len(pieces))
-    for column in (*pieces.T, np.ones(len(pieces))):
-        new = np.where(np.abs(column) > 1e-6, np.sign(column), gear)
-        count += new != gear
-        gear = new
-    return count
 
 
 def _distances(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import LineString, Polygon
+from shapely import LineString, MultiPolygon, Polygon
 
 from polepilot.core.geometry import Pose2D
 from polepilot.core.plan import PlanPart
@@ -53,23 +53,27 @@ def with_visits(
     radius: float,
     smallest: float,
     enough: float,
-) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
-    """The path with visits to patches that it misses, the largest first.
+    missed: MultiPolygon,
+) -> tuple[Points, Gears, tuple[PlanPart, ...], MultiPolygon]:
+    """The path with visits to patches that it misses, the largest first; and what it misses then.
 
-    ``radius``: of the arcs that are driven, metres. ``smallest``: patches smaller than this are
-    left, m²; and so are all others as soon as they make up less than ``enough``.
+    ``missed``: what it misses now. ``radius``: of the arcs that are driven, metres. ``smallest``:
+    patches smaller than this are left, m²; and so are all others as soon as they make up less than
+    ``enough``.
     """
-    patches = patches_of(target.missed(path), smallest)
+    patches = patches_of(missed, smallest)
     left = sum(float(patch.area) for patch in patches)
     if left <= enough:
-        return path, gear, parts
+        return path, gear, parts, missed
     visitor = _Visitor(path, gear, space, target.tool, radius)
     for patch in sorted(patches, key=lambda p: (-float(p.area), p.bounds)):
         if left <= enough or visitor.hopeless:
             break
         visitor.reach(patch, _MOST_CUTS, smallest / 4)
         left -= float(patch.area)
-    return visitor.result(parts)
+    if visitor.visits:
+        missed = target.still_missed(missed, *(visit.points for visit in visitor.visits))
+    return *visitor.result(parts), missed
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,24 +230,23 @@ def _poses(path: Points, gear: Gears) -> Points:
     steps = np.diff(path, axis=0)
     lengths = np.hypot(*steps.T)
     headings = np.arctan2(steps[:, 1] * gear, steps[:, 0] * gear)
-    rows: list[Points] = []
-    for index in np.flatnonzero(lengths > _LEG).tolist():
-        length = float(lengths[index])
-        count = max(1, int((length - 2 * _END) / _APART))
-        at = np.linspace(_END, length - _END, count) if count > 1 else np.array([length / 2])
-        share = at / length
-        spots = path[index] + share[:, None] * steps[index]
-        whole = np.full(len(at), headings[index]), np.full(len(at), float(index)), share
-        rows.append(np.column_stack([spots, *whole]))
+    straight = np.flatnonzero(lengths > _LEG)
+    room = lengths[straight] - 2 * _END
+    counts = np.maximum(1, (room / _APART).astype(np.intp))
+    index = np.repeat(straight, counts)
+    place = np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts, counts)
+    # Evenly from the one end to the other; a single one in the middle.
+    at = (place / np.maximum(counts - 1, 1).repeat(counts)) * room.repeat(counts) + _END
+    share = np.where(counts.repeat(counts) == 1, 0.5, at / lengths[index])
+    legs = np.column_stack(
+        [path[index] + share[:, None] * steps[index], headings[index], index, share]
+    )
     # Where the robot turns round on a straight line, and on arcs between two equal chords.
     turn = np.abs((np.diff(headings) + math.pi) % math.tau - math.pi)
     back = (gear[:-1] != gear[1:]) & (turn < 1e-6) & (np.minimum(lengths[:-1], lengths[1:]) > _END)
     arc = (gear[:-1] == gear[1:]) & (turn > 0.02) & (turn < 0.1)
     arc &= (np.abs(lengths[:-1] - lengths[1:]) < 1e-6) & (lengths[1:] > 0.03)
-    for index in np.flatnonzero(back | arc).tolist():
-        middle = (
-            headings[index]
-            + ((headings[index + 1] - headings[index] + math.pi) % math.tau - math.pi) / 2
-        )
-        rows.append(np.array([[*path[index + 1], middle, index, 1.0]]))
-    return np.vstack(rows) if rows else np.zeros((0, 5))
+    index = np.flatnonzero(back | arc)
+    half = ((headings[index + 1] - headings[index] + math.pi) % math.tau - math.pi) / 2
+    bends = np.column_stack([path[index + 1], headings[index] + half, index, np.ones(len(index))])
+    return np.vstack([legs, bends])

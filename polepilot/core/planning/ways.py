@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polepilot.core.geometry import Point, Pose2D
-from polepilot.core.planning.curves import CHANGE, Curve, joined, sample, spots
+from polepilot.core.planning.curves import CHANGE, Curve, columns, joined, sample, spots
 from polepilot.core.planning.space import FreeSpace
 
 Array = NDArray[np.float64]
@@ -183,7 +183,7 @@ def _checked(
         return None
     rows = np.array([end.row for end in ends], dtype=np.intp)
     poses = np.stack([states.x[rows], states.y[rows], states.heading[rows]], axis=1)
-    points = spots(poses, [end.curve for end in ends], radius)
+    points = spots(poses, *columns([end.curve for end in ends]), radius)
     free = space.holds_each(points.reshape(-1, 2))
     whole = np.flatnonzero(free.reshape(len(ends), -1).all(axis=1))
     for index in whole[:_MOST_CHECKS].tolist():

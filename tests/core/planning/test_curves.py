@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from polepilot.core.geometry import Pose2D, angle_between
 from polepilot.core.planning.curves import (
     Curve,
+    columns,
     curve_length,
     gear_changes,
     sample,
@@ -79,7 +80,7 @@ def test_spots_lie_on_their_curves() -> None:
         (("S", -2.0),),
         (("R", 0.4), ("S", -0.3), ("L", -0.9), ("R", 0.2)),
     ]
-    points = spots(poses, curves, 0.6)
+    points = spots(poses, *columns(curves), 0.6)
     for pose, curve, some in zip(poses.tolist(), curves, points, strict=True):
         line, _, end = sample(Pose2D(*pose), curve, 0.6)
         assert some[-1] == pytest.approx(end.position)
@@ -91,9 +92,9 @@ def test_spots_lie_on_their_curves() -> None:
         for mark in marks:
             there = [np.interp(mark, driven, column) for column in line.T]
             assert np.hypot(*(some - there).T).min() < 0.01
-    same = spots(poses[:1], [curves[0], curves[0]], 0.6)
+    same = spots(poses[:1], *columns([curves[0], curves[0]]), 0.6)
     assert same[0] == pytest.approx(points[0, : same.shape[1]])
-    assert spots(poses[:1], [], 0.6).shape[0] == 0
+    assert spots(poses[:1], *columns([]), 0.6).shape[0] == 0
 
 
 def test_turns_prepared_at_once_are_those_worked_out_one_by_one() -> None:

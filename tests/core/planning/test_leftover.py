@@ -19,7 +19,7 @@ from polepilot.core.site import Site, Start, parse_site
 
 TOOL = 0.4
 ROOM = box(0, 0, 6, 4)
-LOOPS = nested_loops([ROOM], TOOL, 0.002)
+LOOPS = nested_loops([ROOM], TOOL, 0.002).loops
 
 
 def test_of_what_is_left_everywhere_all_loops_are_driven() -> None:

@@ -27,7 +27,7 @@ OPTIONS = PlanOptions(min_turn_radius=0, start=Start(0.5, 0.5))
 def _planned(space: FreeSpace, order: Order = "default") -> tuple[np.ndarray, tuple, Target]:
     options = PlanOptions(min_turn_radius=0, start=OPTIONS.start, order=order)
     target = Target(as_multi(space.reachable().intersection(space.floor)), TOOL)
-    strokes = nested_loops([space.polygon], TOOL, 0.002, overlap=0.004)
+    strokes = nested_loops([space.polygon], TOOL, 0.002, overlap=0.004).loops
     runs = ordered_runs(strokes, (0.5, 0.5), space, options.order, TOOL, 0.22)
     notes: list[str] = []
     path, parts, _ = sharp_path(runs, space, options, target, notes)

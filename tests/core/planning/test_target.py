@@ -65,3 +65,12 @@ def test_which_points_an_area_holds() -> None:
     points = np.random.default_rng(4).uniform(-1, 10, (500, 2))
     found = Target(area, 0.4).holds(points)
     assert np.array_equal(found, shapely.intersects_xy(area, *points.T))
+
+
+def test_what_is_missed_still_after_more(wild: np.ndarray) -> None:
+    target = Target(AREA, TOOL, 0.0001)
+    left = target.still_missed(target.missed(wild[:20]), wild[20:40], wild[40:])
+    expected = target.missed(wild[:20], wild[20:40], wild[40:])
+    assert left.symmetric_difference(expected).area < 1e-4 * expected.area
+    assert target.still_missed(expected, np.array([[20.0, 20], [21, 20]])).equals(expected)
+    assert target.still_missed(MultiPolygon(), wild).is_empty

@@ -24,9 +24,10 @@ def _visited(missed: shapely.Geometry, enough: float = 0.0) -> tuple[np.ndarray,
     site = maps.site(maps.box(0, 0, 4, 4))
     space = free_space(site, PlanOptions())
     target = Target(as_multi(missed), TOOL)
-    path, gear, parts = with_visits(
-        PATH, GEAR, PARTS, target, space, RADIUS, smallest=1e-4, enough=enough
+    path, gear, parts, left = with_visits(
+        PATH, GEAR, PARTS, target, space, RADIUS, 1e-4, enough, target.missed(PATH)
     )
+    assert left.area == pytest.approx(target.missed_area(path), abs=1e-5)
     assert parts == (PlanPart("loop", 0, len(path) - 1),)
     assert len(gear) == len(path) - 1
     assert path[0] == pytest.approx(PATH[0])

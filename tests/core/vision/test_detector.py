@@ -201,6 +201,26 @@ def test_a_cover_matters_where_it_makes_one_landmark_of_another() -> None:
         assert [found.id for found in some.detect(image)] == seen, others
 
 
+@pytest.mark.parametrize("tone", [(76, 66, 62), (40, 40, 42), None], ids=["grey", "dark", "black"])
+@pytest.mark.parametrize("away", [3.0, 6.0, 9.0])
+def test_a_thing_over_two_bits_is_noticed(tone: tuple[int, int, int] | None, away: float) -> None:
+    """On a map whose ids differ in two bits, 14 reads as 2 where both its lower bits are hidden."""
+    some = LandmarkDetector(CAMERA, dict.fromkeys((2, 14), LandmarkKind()))
+    for seed in range(4):
+        image = picture([pole(14, away, 0.0)], seed)
+        one = only(image)
+        unit = (one.bottom - one.top) / 13
+        middle = (one.column, one.top + 8.5 * unit)
+        size = (round(3.5 * unit), round(1.75 * unit))
+        blob = cv2.ellipse(
+            np.zeros(image.shape[:2], np.uint8),
+            (round(middle[0]), round(middle[1])), size, 0, 0, 360, 255, -1,
+        )  # fmt: skip
+        paint = image[round(one.top + 2.5 * unit), round(one.column)]
+        image[blob > 0] = paint if tone is None else tone
+        assert some.detect(image) == []
+
+
 ROWS = np.arange(300.0)[:, None]
 
 

@@ -31,20 +31,17 @@ void eye_encode(int id, int bits, char *code)
     code[segments] = '\0';
 }
 
-/* Whether another landmark that there is would read as this code if something lay over bit segment
- * ``at``: over that alone, or also over what looks like it above and below. */
-int eye_mistakable(const eye_task *task, const char *code, int segments, int at)
+/* Whether another landmark that there is would read as this code if one thing lay over the bit segments
+ * ``first`` and ``last``, and over whatever is between them. */
+int eye_mistakable(const eye_task *task, const char *code, int segments, int first, int last)
 {
-    int bits = (segments - 5) / 2, id = eye_decode(code, segments), own = 1 << (at - 3) / 2;
-    int hidden = own;
-    for (int way = -2; way <= 2; way += 4)
-        for (int i = at + way; i > 2 && i < segments - 3; i += way) {
-            if (code[at] == '1' || code[i] == '1')
-                break;
-            hidden |= 1 << (i - 3) / 2;
-        }
-    for (int other = 1; other < 1 << bits; other++)
-        if (task->kinds[other].bits == bits && (other ^ id) & own && !((other ^ id) & ~hidden))
+    int bits = (segments - 5) / 2, id = eye_decode(code, segments);
+    int top = 1 << (first - 3) / 2, bottom = 1 << (last - 3) / 2;
+    for (int other = 1; other < 1 << bits; other++) {
+        int hidden = other ^ id;
+        if (task->kinds[other].bits == bits && hidden & top && hidden & bottom &&
+            hidden < 2 * bottom && !(hidden & (top - 1)))
             return 1;
+    }
     return 0;
 }

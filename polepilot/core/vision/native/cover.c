@@ -78,6 +78,14 @@ static int has_ends(const flank *beside, int segments, int i)
     return above >= 0 && below < segments && below - above > 1;
 }
 
+/* Whether the same thing is to be seen on both sides of bit ``i`` and begins and ends there; a dark floor or
+ * wall does not. */
+static int lies_over(flank flanks[2][EYE_MOST_SEGMENTS], int segments, int i)
+{
+    return flanks[0][i].same && flanks[1][i].same && has_ends(flanks[0], segments, i) &&
+           has_ends(flanks[1], segments, i);
+}
+
 /* Whether a bit that reads dark may be something else in front of it, which makes one landmark of
  * another. */
 int eye_covered(const eye_picture *p, const eye_task *task, const eye_upright *u,
@@ -117,13 +125,10 @@ int eye_covered(const eye_picture *p, const eye_task *task, const eye_upright *u
             }
         }
     }
-    for (int i = 3; i < segments - 3; i += 2) {
-        if (code[i] == '1' || !flanks[0][i].same || !flanks[1][i].same ||
-            !eye_mistakable(task, code, segments, i))
-            continue;
-        /* It begins and ends beside the strip; a dark floor or wall does not. */
-        if (has_ends(flanks[0], segments, i) && has_ends(flanks[1], segments, i))
-            return 1;
-    }
+    for (int i = 3; i < segments - 3; i += 2)
+        for (int last = i; last < segments - 3 && code[i] == '0' && code[last] == '0'; last += 2)
+            if ((lies_over(flanks, segments, i) || lies_over(flanks, segments, last)) &&
+                eye_mistakable(task, code, segments, i, last))
+                return 1;
     return 0;
 }

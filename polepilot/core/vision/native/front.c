@@ -1,4 +1,4 @@
-/* What speaks for something in front of a bit, whether it reads dark or bright.
+/* What speaks for something in front of a bit, or of several, whether they read dark or bright.
  *
  * A landmark's dark segments are painted with one black, and its sides are straight. What covers a
  * bit has another black (or other paint, where it is bright), or ends amid the dark rows, or shows
@@ -13,7 +13,7 @@
 
 #define ENOUGH 1.7      /* evidence; a piece is hardly ever more than 1 without a cover, */
 #define MOST_OF_ONE 1.5 /* and counts no more than this */
-#define LEAST_UNIT 3.5  /* rows per segment; with fewer there is too little to be seen of a cover */
+#define LEAST_ROWS 3.5  /* rows of a cover; of fewer there is too little to be seen */
 #define MOST_ROWS 512   /* of what is beside a side, */
 #define ROWS_A_UNIT 5.0 /* and how many a segment if there are many more */
 #define REACH 0.8       /* segments that it goes on above and below the code */
@@ -21,12 +21,13 @@
 #define TILT 0.2        /* by so many more segments up or down each */
 #define LEVEL_TILTS 1   /* of them what is seen at one side only may have */
 #define SAME_BOTH 0.015 /* of bright - dark: how much one thing differs on the pole and beside, */
-#define SAME_SHARE 0.045 /* or of how much it stands out, if that is more */
+#define SAME_SHARE 0.06  /* or of how much it stands out, if that is more, */
 #define SAME_ONE 0.02
 #define SAME_NOISE 0.2  /* times the fit's rest, more; */
 #define UNLIKE 5.0      /* times as much of SAME_ONE says nothing any more */
-#define STANDS_OUT 0.2  /* from what is above and below, of bright - dark; at both sides, or */
-#define STANDS_OUT_ONE 0.5 /* at one so that nothing is missing */
+#define STANDS_OUT_LEAST 0.08 /* from what is above and below, of bright - dark; at both sides, */
+#define STANDS_OUT 0.2   /* or with SAME_BOTH, */
+#define STANDS_OUT_ONE 0.5 /* or at one so that nothing is missing */
 #define OTHER_BLACK 0.04   /* of bright - dark, and times the spread of the other dark segments: */
 #define OTHER_SPREAD 3.0
 #define OTHER_PAINT 0.25   /* of bright - dark; gloss and shade differ by less */
@@ -58,11 +59,20 @@ typedef struct {
     double (*levels)[EYE_LIGHTS];
     int segments, channels;
     double dark[EYE_LIGHTS], bright[EYE_LIGHTS], contrast;
-    double black, usual; /* brightness of the dark rows: the middle one and how far others are from it */
+    double black, usual; /* brightness of the dark rows: the middle one and how far others are from it, */
+    int has_rows;        /* if there are enough of them */
+    int coloured;        /* whether the sides can be asked for */
     margin beside[2];
     double width[2][EYE_MOST_SEGMENTS], straight[2]; /* how far a side stands out, and usually does, */
     int shows[2];                                    /* if it is to be seen */
 } scene;
+
+/* Bits next to each other that one thing may lie over. */
+typedef struct {
+    int first, last; /* segments */
+    int top, bottom; /* the run of dark segments that they are in, and the first segment below it */
+    double level[3]; /* their mean light */
+} block;
 
 static double row_of(const scene *s, double place)
 {
@@ -131,29 +141,31 @@ static int light_between(const margin *of, int strip, double from, double to, do
     return 1;
 }
 
-/* How much the light beside bit ``i``, ``shift`` segments lower, differs from the bit's, and by how
- * much it stands out from what is beside the ends of the dark run ``from`` to ``to``. 0 where that
- * is not to be seen, or where it differs by more than ``most``. A cover that leaves a code hides no
- * bright segment by halves: it ends within the run. */
-static int look_beside(const scene *s, int way, int i, int from, int to, double shift,
-                       double most, double *unlike, double *out)
+/* How much the light beside bits, ``shift`` segments lower, differs from theirs, and by how much it
+ * stands out from what is beside the ends of their dark run. 0 where that is not to be seen, or where
+ * it differs by more than ``most``. A cover that leaves a code hides no bright segment by halves: it
+ * ends within the run. */
+static int look_beside(const scene *s, int way, const block *over, double shift, double most,
+                       double *unlike, double *out)
 {
     double above[3], below[3], at[3];
     const margin *of = s->beside + way;
-    double top = from + shift, bottom = to + shift, bit = i + shift;
-    if (!light_between(of, OFF, row_of(s, bit + 0.1), row_of(s, bit + 0.9), at))
+    double top = over->top + shift, bottom = over->bottom + shift;
+    double middle = (over->first + over->last + 1) / 2.0 + shift;
+    double half = 0.4 + (over->last - over->first) / 4.0; /* what is round is widest there */
+    if (!light_between(of, OFF, row_of(s, middle - half), row_of(s, middle + half), at))
         return 0;
-    *unlike = apart(s, at, s->levels[i]);
+    *unlike = apart(s, at, over->level);
     if (*unlike > most ||
         !light_between(of, OFF, row_of(s, top - 1), row_of(s, top - 0.15), above) ||
         !light_between(of, OFF, row_of(s, bottom + 0.15), row_of(s, bottom + 1), below))
         return 0;
-    *out = fmin(apart(s, above, s->levels[i]), apart(s, below, s->levels[i]));
+    *out = fmin(apart(s, above, over->level), apart(s, below, over->level));
     return 1;
 }
 
-/* Whether the bit goes on at both sides of the pole, and ends: evidence. */
-static double goes_on(const scene *s, int i, int from, int to)
+/* Whether what is there goes on at both sides of the pole, and ends: evidence. */
+static double goes_on(const scene *s, const block *over)
 {
     double noise = SAME_NOISE * s->scale->noise, one = SAME_ONE + noise, both = SAME_BOTH + noise;
     double most = 0;
@@ -161,10 +173,11 @@ static double goes_on(const scene *s, int i, int from, int to)
     for (int way = 0; way < 2; way++)
         for (int k = -TILTS; k <= TILTS; k++) {
             double unlike, out;
-            if (!look_beside(s, way, i, from, to, TILT * k, UNLIKE * one, &unlike, &out) ||
-                out < STANDS_OUT)
+            if (!look_beside(s, way, over, TILT * k, UNLIKE * one, &unlike, &out) ||
+                out < STANDS_OUT_LEAST)
                 continue;
-            same[way][k + TILTS] = unlike < fmax(both, SAME_SHARE * out) && out > 3 * both;
+            same[way][k + TILTS] =
+                unlike < fmax(out < STANDS_OUT ? 0 : both, SAME_SHARE * out) && out > 3 * both;
             if (abs(k) <= LEVEL_TILTS)
                 most = fmax(most, fmin(out / STANDS_OUT_ONE, 1) * one / fmax(unlike, one / 2));
         }
@@ -175,20 +188,20 @@ static double goes_on(const scene *s, int i, int from, int to)
     return at_most(most);
 }
 
-/* Whether the bit's black is another one than that of the other dark segments: evidence. Of colour
+/* Whether their black is another one than that of the other dark segments: evidence. Of colour
  * the middle channel is asked, which every camera and JPEG keep best. */
-static double other_black(const scene *s, int i)
+static double other_black(const scene *s, const block *over)
 {
     double values[EYE_MOST_SEGMENTS];
     int n = 0, channel = s->channels == 3 ? 1 : 0;
     for (int k = 2; k < s->segments - 2; k++)
-        if (s->code[k] == '0' && abs(k - i) > 1)
+        if (s->code[k] == '0' && (k < over->first - 1 || k > over->last + 1))
             values[n++] = s->levels[k][channel];
     if (n < 3)
         return 0;
     double middle = eye_median(values, n);
     double spread = fmax(values[n - 1] - middle, middle - values[0]) / s->contrast;
-    double off = fabs(s->levels[i][channel] - middle) / s->contrast;
+    double off = fabs(over->level[channel] - middle) / s->contrast;
     return at_most(off / (OTHER_BLACK + OTHER_SPREAD * spread));
 }
 
@@ -229,19 +242,22 @@ static void know_sides(scene *s, const eye_task *task)
     }
 }
 
-/* Whether the sides stand out where the bit is, and nowhere else: evidence. */
-static double swells(const scene *s, int i, int from, int to)
+/* Whether the sides stand out where the bits are, and nowhere else: evidence. */
+static double swells(const scene *s, const block *over)
 {
     double both = 0;
     for (int way = 0; way < 2; way++) {
         const double *width = s->width[way];
         double elsewhere = 0, usual = s->straight[way];
-        if (!s->shows[way] || isnan(width[i]))
+        double here = INFINITY;
+        for (int k = over->first; k <= over->last; k += 2)
+            here = fmin(here, width[k]);
+        if (!s->shows[way] || isnan(width[over->first]) || isnan(width[over->last]))
             continue;
         for (int k = 0; k < s->segments; k++)
-            if ((k < from || k >= to) && !isnan(width[k]))
+            if ((k < over->top || k >= over->bottom) && !isnan(width[k]))
                 elsewhere = fmax(elsewhere, fabs(width[k] - usual));
-        both += at_most((width[i] - usual) / fmax(SWELLS, SWELLS_SPREAD * elsewhere));
+        both += at_most((here - usual) / fmax(SWELLS, SWELLS_SPREAD * elsewhere));
     }
     return both;
 }
@@ -290,6 +306,37 @@ static double step(const scene *s, const eye_upright *u, int from, int to)
     return room > 0 ? at_most(most / (STEP * room + STEP_SPREAD * s->usual)) : 0;
 }
 
+static block block_of(const scene *s, int first, int last)
+{
+    block over = {.first = first, .last = last, .top = first, .bottom = last + 1};
+    int inner = last > first; /* its edges are lightened by what is above and below */
+    for (int i = first + inner; i <= last - inner; i++)
+        for (int c = 0; c < s->channels; c++)
+            over.level[c] += s->levels[i][c] / (last - first + 1 - 2 * inner);
+    while (s->code[first] == '0' && s->code[over.top - 1] == '0')
+        over.top--;
+    while (s->code[last] == '0' && s->code[over.bottom] == '0')
+        over.bottom++;
+    return over;
+}
+
+/* All that speaks for something in front of these bits. */
+static double evidence_of(const scene *s, const eye_upright *u, const block *over)
+{
+    double evidence;
+    if (s->code[over->first] == '1') {
+        evidence = other_paint(s, over->first);
+        if (evidence < LIKE_PAINT)
+            return 0;
+        evidence += goes_on(s, over);
+    } else {
+        evidence = goes_on(s, over) + other_black(s, over);
+        if (s->has_rows)
+            evidence += step(s, u, over->top, over->bottom);
+    }
+    return s->coloured && evidence <= ENOUGH ? evidence + swells(s, over) : evidence;
+}
+
 /* Whether something stands in front of a bit, which makes one landmark of another. */
 int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *u,
                  const eye_scale *scale, const eye_side *side, const char *code,
@@ -314,39 +361,33 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
         if (c < p->channels)
             s.contrast = fmax(s.contrast, s.bright[c] - s.dark[c]);
     }
-    int filled = 0, rows = 0, sides = eye_is_coloured(p->channels, task);
-    if (s.contrast <= 0 || scale->unit < LEAST_UNIT)
+    if (s.contrast <= 0)
         return 0;
-    for (int i = 3; i < segments - 3; i += 2) {
-        if (!eye_mistakable(task, code, segments, i))
-            continue;
-        if (!filled) {
-            for (int way = 0; way < 2; way++)
-                fill_margin(p, u, side, &s, task->low, way ? 1 : -1, s.beside + way);
-            rows = know_dark_rows(&s, u);
-            if (sides)
-                know_sides(&s, task);
-            filled = 1;
-        }
-        int from = i, to = i + 1;
-        double evidence = 0;
-        if (code[i] == '1') {
-            evidence = other_paint(&s, i);
-            if (evidence < LIKE_PAINT)
+    int filled = 0;
+    for (int i = 3; i < segments - 3; i += 2)
+        for (int last = i; last < segments - 3; last += 2) {
+            if (last > i && (code[i] == '1' || code[last] == '1'))
+                break;
+            double length = (last - i) / 2.0 + 1; /* with half of what is above and below */
+            if (scale->unit * length < LEAST_ROWS || !eye_mistakable(task, code, segments, i, last))
                 continue;
-            evidence += goes_on(&s, i, from, to);
-        } else {
-            while (code[from - 1] == '0')
-                from--;
-            while (code[to] == '0')
-                to++;
-            evidence = goes_on(&s, i, from, to) + other_black(&s, i) +
-                       (rows ? step(&s, u, from, to) : 0);
+            if (!filled) {
+                for (int way = 0; way < 2; way++)
+                    fill_margin(p, u, side, &s, task->low, way ? 1 : -1, s.beside + way);
+                s.has_rows = know_dark_rows(&s, u);
+                s.coloured = eye_is_coloured(p->channels, task);
+                if (s.coloured)
+                    know_sides(&s, task);
+                filled = 1;
+            }
+            block over = block_of(&s, i, last);
+            if (evidence_of(&s, u, &over) > ENOUGH)
+                return 1;
+            if (last == i || scale->unit < LEAST_ROWS)
+                continue;
+            block upper = block_of(&s, i, i), lower = block_of(&s, last, last);
+            if (goes_on(&s, &upper) > ENOUGH || goes_on(&s, &lower) > ENOUGH)
+                return 1; /* what is seen for certain over one of them is enough */
         }
-        if (sides && evidence <= ENOUGH)
-            evidence += swells(&s, i, from, to);
-        if (evidence > ENOUGH)
-            return 1;
-    }
     return 0;
 }

@@ -104,7 +104,7 @@ double eye_median(double *values, int n);
 int eye_solve(double *matrix, double *right, int n, int rights);
 int eye_decode(const char *code, int segments);
 void eye_encode(int id, int bits, char *code);
-int eye_mistakable(const eye_task *task, const char *code, int segments, int at);
+int eye_mistakable(const eye_task *task, const char *code, int segments, int first, int last);
 
 static inline int eye_clamp(int value, int low, int high)
 {

@@ -51,7 +51,6 @@ def plan(
 
     from polepilot.commands.files import write_whole
     from polepilot.core.planning.options import PlanOptions
-    from polepilot.core.planning.plot import plot_svg
     from polepilot.core.site import read_site
 
     site = read_site(site_file)
@@ -66,6 +65,8 @@ def plan(
     with naming_file(site_file):
         result = make_plan(site, mode, route, options, end_heading)
     if plot is not None:
+        from polepilot.core.planning.plot import plot_svg
+
         write_whole({plot: plot_svg(site, result).encode("utf-8")}, "--plot")
     if as_json:
         typer.echo(json.dumps(result.to_json(), allow_nan=False))

@@ -176,7 +176,7 @@ class _Bumped:
         swept = shapely.buffer(lines, self._radius, quad_segs=_ROUND)
         of, bumps = shapely.STRtree(swept).query(rest, predicate="intersects")
         rest = rest.copy()
-        for patch in np.unique(of).tolist():
+        for patch in np.flatnonzero(np.bincount(of)).tolist():
             # All at once: a long patch would be cut anew, in whole, for every one of them.
             rest[patch] = rest[patch].difference(shapely.union_all(swept[bumps[of == patch]]))
         return rest

@@ -51,7 +51,7 @@ def without_crumbs(
 def _short(path: Points, fixed: Indices, shortest: float) -> Indices:
     """Which points to leave out so that no step is shorter, the ``fixed`` ones not."""
     short = np.flatnonzero(np.hypot(*np.diff(path, axis=0).T) < shortest)
-    stretches = np.unique(np.searchsorted(fixed, short, side="right") - 1)
+    stretches = np.flatnonzero(np.bincount(np.searchsorted(fixed, short, side="right") - 1))
     dropped: list[int] = []
     for first, last in fixed[stretches[:, None] + np.arange(2)].tolist():
         kept = [first]

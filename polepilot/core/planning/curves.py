@@ -24,6 +24,9 @@ Piece = tuple[str, float]
 """("S" straight, "L" left or "R" right, signed length in metres: backward negative)."""
 Curve = tuple[Piece, ...]
 
+Sampled = tuple[Array, NDArray[np.int8], Pose2D]
+"""N x 2 points with the start, N-1 gears, and the pose at the end."""
+
 CHANGE = 0.5
 """What a change of gear costs, as metres of path."""
 _MOST = 8
@@ -77,33 +80,26 @@ def drive(pose: Pose2D, piece: Piece, radius: float) -> Pose2D:
     return Pose2D(pose.x + x, pose.y + y, wrap_angle(pose.heading + turn))
 
 
-def sample(
-    pose: Pose2D, curve: Curve, radius: float
-) -> tuple[NDArray[np.float64], NDArray[np.int8], Pose2D]:
-    """N x 2 points with the start, N-1 gears, and the pose at the end."""
-    rows: list[tuple[float, float, float, float, float]] = []
-    counts: list[int] = []
-    start = (pose.x, pose.y)
-    for piece in curve:
-        kind, length = piece
-        if abs(length) >= 1e-6:  # else no point of its own, but what it turns tells a metre on
-            bend = _SIDES[kind] * length / radius
-            rows.append((pose.x, pose.y, pose.heading, bend, length))
-            counts.append(max(1, math.ceil(abs(bend) / STEP - 1e-6)))
-        pose = drive(pose, piece, radius)
-    if not rows:
-        return np.array([start]), np.zeros(0, np.int8), pose
-    of = np.repeat(np.arange(len(rows)), counts)
-    x, y, heading, bend, length = np.array(rows)[of].T
-    ends = np.cumsum(counts)
-    share = (np.arange(1, len(of) + 1) - (ends - counts)[of]) / np.array(counts)[of]
-    turned = share * bend / 2
-    chord = share * length * np.sinc(turned / math.pi)
-    points = np.empty((len(of) + 1, 2))
-    points[0] = start
-    points[1:, 0] = x + chord * np.cos(heading + turned)
-    points[1:, 1] = y + chord * np.sin(heading + turned)
-    return points, np.where(length > 0, 1, -1).astype(np.int8), pose
+def sample(pose: Pose2D, curve: Curve, radius: float) -> Sampled:
+    """The points of a curve that begins at ``pose``, their gears, and the pose at its end."""
+    x, y, heading = pose
+    points, gears = [(x, y)], []
+    for kind, length in curve:
+        side = _SIDES[kind]
+        bend = side * length / radius
+        # What is too short gets no point of its own, but what it turns tells a metre on.
+        count = max(1, math.ceil(abs(bend) / STEP - 1e-6)) if abs(length) >= 1e-6 else 0
+        if side:
+            cos, sin = math.cos(heading), math.sin(heading)
+            for turned in [bend * (k / count) + heading for k in range(1, count)]:
+                east, north = math.sin(turned) - sin, math.cos(turned) - cos
+                points.append((x + side * radius * east, y - side * radius * north))
+        pose = drive(Pose2D(x, y, heading), (kind, length), radius)
+        x, y, heading = pose
+        if count:
+            points.append((x, y))
+            gears += [1 if length > 0 else -1] * count
+    return np.array(points), np.array(gears, np.int8), pose
 
 
 def columns(curves: Sequence[Curve]) -> tuple[Array, Array]:

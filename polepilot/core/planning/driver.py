@@ -31,7 +31,7 @@ from polepilot.core.planning.curves import (
     sample,
     spots,
 )
-from polepilot.core.planning.space import FreeSpace
+from polepilot.core.planning.space import STRIDE, FreeSpace
 from polepilot.core.planning.track import PLAIN, Track
 from polepilot.core.planning.turns import Turn, prepare, turns_round
 from polepilot.core.planning.ways import way_to_line
@@ -267,8 +267,7 @@ class Driver:
         for first in range(0, len(sides), _AT_ONCE):
             some = slice(first, first + _AT_ONCE)
             points = spots(np.array([pose]), sides[some], lengths[some], self._radius)
-            free = self._space.holds_each(points.reshape(-1, 2)).reshape(len(points), -1)
-            yield from (first + np.flatnonzero(free.all(axis=1))).tolist()
+            yield from (first + np.flatnonzero(self._space.holds_rows(points))).tolist()
 
     def _along_path(self, place: geometry.Point, heading: float | None) -> bool:
         """Along the shortest path, all of its corners turned; leaves the track half-way if not."""
@@ -333,8 +332,9 @@ class Driver:
         if width <= cut and tangent <= min(before - self.track.reserve, room) + 1e-9:
             arc: Curve = (("L" if turn > 0 else "R", abs(turn) * self._radius),)
             whole = joined((("S", before - tangent), *arc))
-            if self._fits(self.track.pose, whole):
-                self.track.append(whole)
+            sampled = sample(self.track.pose, whole, self._radius)
+            if self._space.holds_points(sampled[0]):
+                self.track.append(whole, sampled)
                 self.track.straight = 0.0
                 return True
         return self._turn_at(corner, heading, before, after, cut)
@@ -383,14 +383,14 @@ class Driver:
         of the way in, and what is to the left of it."""
         for first in range(0, len(ways), _SOME):
             some = ways[first : first + _SOME]
-            sizes = np.array([len(way.points) for way in some], dtype=np.intp)
-            points = np.concatenate([way.points for way in some]) @ turned + corner
-            ends: NDArray[np.intp] = np.cumsum(sizes)
-            free = np.logical_and.reduceat(self._space.holds_each(points), ends - sizes)
-            for index in np.flatnonzero(free).tolist():
-                line = np.vstack([start, points[ends[index] - sizes[index] : ends[index]]])
-                if self._space.holds(shapely.LineString(line)):
-                    yield some[index]
+            few = [way.points[::STRIDE] for way in some]
+            ends = np.cumsum([len(points) for points in few])
+            free = self._space.holds_each(np.concatenate(few) @ turned + corner)
+            for way, last, points in zip(some, ends.tolist(), few, strict=True):
+                if free[last - len(points) : last].all():
+                    line = np.vstack([start, way.points @ turned + corner])
+                    if self._space.holds_points(line):
+                        yield way
 
     def _resume(self, points: Points, index: int) -> int | None:
         """Gets back onto ``points`` at the corner ``index`` or later; which corner comes next.

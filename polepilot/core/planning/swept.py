@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import cv2
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -62,7 +61,10 @@ def few_corners(path: NDArray[np.float64], error: float = _CHORD) -> NDArray[np.
     stretches = np.repeat(np.arange(len(sizes)), sizes)
     lines = shapely.linestrings(np.column_stack([path[places], places]), indices=stretches)
     few = shapely.simplify(lines, error, preserve_topology=False)
-    return np.unique(np.round(shapely.get_coordinates(few, include_z=True)[:, 2]).astype(np.intp))
+    kept = np.round(shapely.get_coordinates(few, include_z=True)[:, 2]).astype(np.intp)
+    return np.asarray(
+        kept[np.r_[True, np.diff(kept) > 0]]
+    )  # a corner ends one line and begins the next
 
 
 def swept_pieces(
@@ -116,6 +118,8 @@ class SweptArea:
     """
 
     def __init__(self, area: MultiPolygon, tool_width: float, cell: float = 0.02) -> None:
+        import cv2  # who only plans starts sooner without it
+
         self.tool_width = tool_width
         x0, y0, x1, y1 = area.bounds if not area.is_empty else (0.0, 0.0, 0.0, 0.0)
         width, height = x1 - x0 + 0.1, y1 - y0 + 0.1

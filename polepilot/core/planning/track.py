@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polepilot.core.geometry import Pose2D, angle_between, wrap_angle
-from polepilot.core.planning.curves import CHANGE, STEP, Curve, joined, sample
+from polepilot.core.planning.curves import CHANGE, STEP, Curve, Sampled, joined, sample
 
 Points = NDArray[np.float64]
 Saved = tuple[int, int, Pose2D, float, int]
@@ -58,12 +58,12 @@ class Track:
         gears = np.concatenate(self.gears) if self.gears else np.zeros(0, np.int8)
         return np.vstack(self.points), gears
 
-    def append(self, curve: Curve) -> None:
-        """Drives ``curve`` from the end on."""
+    def append(self, curve: Curve, sampled: Sampled | None = None) -> None:
+        """Drives ``curve`` from the end on; ``sampled``: what ``sample`` makes of it, if known."""
         curve = joined(curve)
         if not curve:
             return
-        points, gears, pose = sample(self.pose, curve, self.radius)
+        points, gears, pose = sampled or sample(self.pose, curve, self.radius)
         straight = self.straight if curve[0][0] == "S" else 0.0
         if len(curve) == 1 and curve[0][0] == "S":
             straight = max(0.0, straight + curve[0][1])

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +57,7 @@ _DIGITS = 5
 _MOST_KNOWN = 8000
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class Turn:
     """A way round a corner, in a frame with the corner at the origin and the way in along x."""
 
@@ -73,26 +72,23 @@ class Turn:
     curve: Curve
     """From ``lead`` to ``stop``."""
     radius: float
+    _points: Points | None = field(init=False, default=None)
 
     @property
     def points(self) -> Points:
         """The curve's points, M x 2, from the corner on where that is visited."""
-        if self.visit:
-            begin, curve = 0.0, joined((("S", self.lead), *self.curve))
-        else:
+        if self._points is None:
             begin, curve = self.lead, self.curve
-        return _points(begin, curve, self.radius)
+            if self.visit:
+                begin, curve = 0.0, joined((("S", self.lead), *self.curve))
+            self._points = sample(Pose2D(begin, 0.0, 0.0), curve, self.radius)[0]
+        return self._points
 
     def after(self, before: float) -> Curve:
         """The whole curve for a corner that lies ``before`` metres ahead."""
         if self.visit:
             return joined((("S", before), ("S", self.lead), *self.curve))
         return joined((("S", before + self.lead), *self.curve))
-
-
-@lru_cache(maxsize=20_000)
-def _points(begin: float, curve: Curve, radius: float) -> Points:
-    return sample(Pose2D(begin, 0.0, 0.0), curve, radius)[0]
 
 
 _KNOWN: dict[tuple[float, float, bool], tuple[Turn, ...]] = {}

@@ -100,6 +100,8 @@ class _Visitor:
         self._tool = tool
         self._radius = radius
         self._poses = _poses(path, gear)
+        self._sorted = np.argsort(self._poses[:, 0], kind="stable")
+        self._columns = self._poses[self._sorted, 0]
         self.visits: list[_Visit] = []
         self._lines: list[LineString] = []
         self._failures = 0
@@ -183,10 +185,13 @@ class _Visitor:
 
     def _near(self, x: float, y: float) -> NDArray[np.intp]:
         """Poses on the path from which ways to a place are looked for."""
-        distances = np.hypot(self._poses[:, 0] - x, self._poses[:, 1] - y)
-        near = np.flatnonzero(distances < _NEAR * self._radius)
-        order = np.argsort(np.round(distances[near], 6), kind="stable")[:_MOST_POSES]
-        return near[order]
+        reach = _NEAR * self._radius
+        first, last = np.searchsorted(self._columns, [x - reach, x + reach])
+        some = self._sorted[first:last]
+        distances = np.hypot(self._poses[some, 0] - x, self._poses[some, 1] - y)
+        near = distances < reach
+        some, distances = some[near], np.round(distances[near], 6)
+        return np.asarray(some[np.lexsort((some, distances))[:_MOST_POSES]])
 
     def result(self, parts: tuple[PlanPart, ...]) -> tuple[Points, Gears, tuple[PlanPart, ...]]:
         """The path with all visits, its gears, and its parts."""

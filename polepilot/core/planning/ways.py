@@ -184,9 +184,7 @@ def _checked(
     rows = np.array([end.row for end in ends], dtype=np.intp)
     poses = np.stack([states.x[rows], states.y[rows], states.heading[rows]], axis=1)
     points = spots(poses, *columns([end.curve for end in ends]), radius)
-    free = space.holds_each(points.reshape(-1, 2))
-    whole = np.flatnonzero(free.reshape(len(ends), -1).all(axis=1))
-    for index in whole[:_MOST_CHECKS].tolist():
+    for index in np.flatnonzero(space.holds_rows(points))[:_MOST_CHECKS].tolist():
         start, curve = _traced(trail, ends[index].row, ends[index].curve, step)
         first = trail[0]
         pose = Pose2D(float(first.x[start]), float(first.y[start]), float(first.heading[start]))

@@ -184,7 +184,7 @@ class _Bumped:
     def _step_aside(self, piece: Polygon) -> bool:
         """Leads a stretch of a straight leg nearer to a piece of a strip beside it."""
         radius = self._radius
-        near = self._tree.query(piece, predicate="dwithin", distance=1.5 * radius)
+        near, _ = self._legs_near(piece, 1.5 * radius)
         middle = shapely.centroid(piece)
         lengths = np.round(shapely.distance(self._lines[near], middle), 5)
         for index in near[np.lexsort((near, lengths))][:4].tolist():
@@ -212,6 +212,13 @@ class _Bumped:
             if left < _LOSS * (radius / 0.2) ** 2 and self._try(first, last, tips, 4.0):
                 return True
         return False
+
+    def _legs_near(self, shape: shapely.Geometry, most: float) -> tuple[NDArray[np.intp], Points]:
+        """Which legs of the path are no farther than ``most`` from a shape, and how far."""
+        x0, y0, x1, y1 = shape.bounds
+        near = self._tree.query(shapely.box(x0 - most, y0 - most, x1 + most, y1 + most))
+        lengths = shapely.distance(self._lines[near], shape)
+        return near[lengths <= most], lengths[lengths <= most]
 
     def _taken(self, first: float, last: float) -> bool:
         """Whether a stretch of the path holds another bump, or a point that stays."""
@@ -244,11 +251,10 @@ class _Bumped:
         if others and shapely.intersects(np.array(others), place).any():
             return  # an earlier bump does that
         for reach in (1.0, 4.0):
-            near = self._tree.query(place, predicate="dwithin", distance=reach * self._radius)
-            lengths = np.round(shapely.distance(self._lines[near], place), 6)
+            near, lengths = self._legs_near(place, reach * self._radius)
             lines = (
                 (index, shapely.shortest_line(self._lines[index], place))
-                for index in near[np.lexsort((near, lengths))].tolist()
+                for index in near[np.lexsort((near, np.round(lengths, 6)))].tolist()
             )
             free = next(((index, line) for index, line in lines if self._space.holds(line)), None)
             if free is not None:

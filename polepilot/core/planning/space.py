@@ -38,7 +38,7 @@ _FEW = 8
 """Fewer points than this are looked at one by one."""
 _RIM, _UNKNOWN, _INSIDE, _OUTSIDE = range(4)
 """What is known of such a square."""
-_AROUND = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
+_AROUND = np.array([-1, 0, 1])
 POLE_GAP = 0.01
 """A pole whose surface is farther than this from everything stands free, m."""
 
@@ -64,25 +64,29 @@ class _Squares:
         x0, y0, x1, y1 = shape.bounds
         self._shape = shape
         self._side = side = max(_SQUARE, math.sqrt((x1 - x0) * (y1 - y0) / _MOST_SQUARES))
-        self._origin = np.array([x0, y0]) - 2 * side
-        self._last = np.ceil((np.array([x1, y1]) - self._origin) / side).astype(np.intp) + 2
-        self._state = np.full(int(np.prod(self._last + 1)), _UNKNOWN, np.int8)
+        self._x, self._y = x0 - 2 * side, y0 - 2 * side
+        self._columns, self._rows = (math.ceil(size / side) + 4 for size in (x1 - x0, y1 - y0))
+        self._state = np.full(self._columns * self._rows, _UNKNOWN, np.int8)
         rim = shapely.get_coordinates(shapely.segmentize(shape.boundary, side / 2))
-        near = (((rim - self._origin) / side).astype(np.intp)[:, None] + _AROUND).reshape(-1, 2)
-        self._state[self._number(near)] = _RIM
+        near = self._numbers(rim)[:, None] + _AROUND + self._rows * _AROUND[:, None, None]
+        self._state[near] = _RIM
 
-    def _number(self, squares: NDArray[np.intp]) -> NDArray[np.intp]:
-        return np.asarray(squares[:, 0] * (self._last[1] + 1) + squares[:, 1])
+    def _numbers(self, points: NDArray[np.float64]) -> NDArray[np.intp]:
+        """In which squares points are; those beside all of them are in one at the border."""
+        x = (points[:, 0] - self._x) / self._side
+        y = (points[:, 1] - self._y) / self._side
+        column = np.minimum(np.maximum(x, 0.0), self._columns - 1).astype(np.intp)
+        row = np.minimum(np.maximum(y, 0.0), self._rows - 1).astype(np.intp)
+        return np.asarray(column * self._rows + row)
 
     def hold(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Which of N x 2 points are in the shape."""
-        squares = ((points - self._origin) / self._side).clip(0, self._last).astype(np.intp)
-        numbers = self._number(squares)
+        numbers = self._numbers(points)
         state = self._state[numbers]
         inside = state == _INSIDE
         ask = np.flatnonzero(state <= _UNKNOWN)
         if len(ask):
-            inside[ask] = shapely.intersects_xy(self._shape, *points[ask].T)
+            inside[ask] = shapely.intersects_xy(self._shape, points[ask, 0], points[ask, 1])
             new = ask[state[ask] == _UNKNOWN]
             self._state[numbers[new]] = np.where(inside[new], _INSIDE, _OUTSIDE)
         return np.asarray(inside)

@@ -30,17 +30,21 @@ def unreachable_pieces(space: FreeSpace, reachable: MultiPolygon) -> tuple[Unrea
     """The floor that ``reachable`` leaves, piece by piece, the largest first; rings are split."""
     walls = space.lines.buffer(0.0002) if not space.lines.is_empty else space.lines
     rest = space.floor.difference(reachable.buffer(_SLIVER))
-    # On both sides of a thin wall there may be parts of a piece that is large enough only whole.
-    whole_ones = [part for part in polygons(rest) if part.area >= SMALLEST * 0.8]
-    parts: list[Polygon] = []
-    for large in whole_ones:
-        if _grown(large, space, reachable).area >= SMALLEST:
-            least = min(SMALLEST / 5, _CRUMB * large.area)
-            parts += [part for part in polygons(large.difference(walls)) if part.area >= least]
+    parts: list[tuple[Polygon, Polygon]] = []
+    for large in (piece for piece in polygons(rest) if piece.area >= SMALLEST * 0.8):
+        whole = _grown(large, space, reachable)
+        if whole.area < SMALLEST:
+            continue
+        if walls.disjoint(large):
+            parts.append((large, whole))
+            continue
+        # On both sides of a thin wall there may be parts of one that is large enough only whole.
+        least = min(SMALLEST / 5, _CRUMB * large.area)
+        halves = polygons(large.difference(walls))
+        parts += [(p, _grown(p, space, reachable)) for p in halves if p.area >= least]
     pieces: list[tuple[Polygon, str]] = []
     passages = _Passages(space)
-    for index, part in enumerate(sorted(parts, key=lambda p: -float(p.area))):
-        whole = _grown(part, space, reachable)
+    for index, (_, whole) in enumerate(sorted(parts, key=lambda entry: -float(entry[0].area))):
         if index < _MOST_REASONS:
             reason = passages.reason(whole)
         else:
@@ -55,8 +59,12 @@ def unreachable_pieces(space: FreeSpace, reachable: MultiPolygon) -> tuple[Unrea
 
 def _grown(part: Polygon, space: FreeSpace, reachable: MultiPolygon) -> Polygon:
     """A part with what was taken of it against slivers, but nothing of what is reachable."""
-    grown = part.buffer(_SLIVER, join_style="mitre").intersection(space.floor)
-    return max(polygons(grown.difference(reachable)) or [part], key=lambda p: float(p.area))
+    grown = part.buffer(_SLIVER, join_style="mitre")
+    floor, taken = (
+        shapely.clip_by_rect(shape, *grown.bounds) for shape in (space.floor, reachable)
+    )
+    left = polygons(grown.intersection(floor).difference(taken))
+    return max(left or [part], key=lambda p: float(p.area))
 
 
 class _Passages:

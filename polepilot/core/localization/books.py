@@ -59,6 +59,11 @@ class Books:
         self.doubt.clear()
         self._agreed = dict.fromkeys(agreed, stamp)
 
+    def reopen(self, stamp: float, agreed: Iterable[int]) -> None:
+        """The pose that was given up last was right all the same."""
+        self.open(stamp, agreed)
+        self.health.restore()
+
     def close(self) -> list[RangeBearing]:
         """The pose is given up; what contradicted it, in order of time."""
         health, against = self.health, {*self.trial.give_up(), *self.doubt.against}
@@ -67,7 +72,7 @@ class Books:
             health.moved.clear()
         self.doubt.clear()
         self._agreed.clear()
-        health.forget()
+        health.set_aside()
         if self._presence is not None:
             self._presence.forget()
         return sorted(against, key=lambda m: m.stamp)
@@ -126,6 +131,7 @@ class Books:
         if place is not None and self._others_agree(number, stamp):
             aside = math.hypot(track.heading_sigma, measurement.bearing_sigma)
             sigma = math.hypot(track.sigma, measurement.range * aside, measurement.range_sigma)
+            track.supposed.begin(track.filter, stamp, mark, place)
             self.contradicted(number, stamp, place, sigma)
         return False
 
@@ -142,10 +148,12 @@ class Books:
     def _agrees(self, track: Track, measurement: RangeBearing, gap: float) -> None:
         number, stamp = measurement.landmark, measurement.stamp
         self._agreed[number] = stamp
+        track.supposed.end(number)
         self.health.agreed(number)
         self.trial.agrees(measurement)
         if gap < 0.5 * self._tolerance and not self.trial.undecided:
-            for verdict in self.health.witnessed(number):
+            for verdict in self.health.witnessed(number, stamp, track.supposed.places()):
+                track.supposed.end(verdict.landmark)
                 self._tell(verdict, stamp)
         pan = measurement.pan
         if self._presence is None or pan is None or not math.isfinite(measurement.range):
@@ -154,6 +162,14 @@ class Books:
         if self._presence.saw(number, measurement.range, off_axis, track.filter.pose):
             text = f"Landmark {number} is seen again."
             self._events.add(LocalizerEvent(stamp, "landmark_back", text, number))
+
+    def displaced(self, measurement: RangeBearing, place: Point, sigma: float) -> bool:
+        """Whether a landmark that appears at ``place``, by a pose of others, is not in its own."""
+        off = math.dist(place, self._landmarks[measurement.landmark].position)
+        if off <= max(0.5 * self._tolerance, 3.0 * sigma):
+            return False
+        self.contradicted(measurement.landmark, measurement.stamp, place, sigma)
+        return True
 
     def contradicted(self, number: int, stamp: float, place: Point, sigma: float) -> None:
         """A landmark is not in its place though the pose is right: is it to be left out?"""

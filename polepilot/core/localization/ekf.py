@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from polepilot.core.geometry import Point, Pose2D, wrap_angle
 from polepilot.core.landmark import Landmark
+from polepilot.core.localization.doubt import largest_sigma
 from polepilot.core.localization.fix import Fix
 from polepilot.core.localization.health import place_of
 from polepilot.core.localization.noise import NoiseModel
@@ -35,6 +36,8 @@ Array = NDArray[np.float64]
 
 _WIDE = (0.3, 0.3, math.radians(8.0))
 """Standard deviations before the sightings of a fix are taken in, metres and radians."""
+_ANYWHERE = 1.0
+"""Of the place of a landmark of which nothing is known, metres."""
 _NO_RANGE = 1e6
 """Variance of a range that was not measured, m²."""
 
@@ -178,18 +181,18 @@ class PoseFilter:
         stamp: float,
         sightings: Sequence[tuple[RangeBearing, Landmark]],
         history: OdometryHistory,
-    ) -> float:
+    ) -> list[RangeBearing]:
         """Start at a fix, ``found`` at ``stamp``, by taking its ``sightings`` in, oldest first.
 
         The fix serves as the point of linearization only. Its own covariance would not say how
         its error hangs together with the potentiometer's, and be counted twice. Answers which
-        share of the sightings passed the gate.
+        of the sightings did not pass the gate.
         """
         start = min([stamp, *(sighting.stamp for sighting, _ in sightings)])
         factor, offset = self.speed_factor, self.steering_offset
         before = history.advance(found.pose, stamp, start, factor, offset)
         self.reset(before, np.diag(np.square(_WIDE)))
-        taken = 0
+        refused = []
         for sighting, landmark in sightings:
             self.predict(history.steps(start, sighting.stamp))
             start = max(start, sighting.stamp)
@@ -197,9 +200,10 @@ class PoseFilter:
             innovation = self.innovation(sighting, landmark)
             if innovation.squared <= self.gate:
                 self.update(innovation)
-                taken += 1
+            else:
+                refused.append(sighting)
         self.predict(history.steps(start, stamp))
-        return taken / max(len(sightings), 1)
+        return refused
 
     def predict(self, steps: Iterable[Step]) -> float:
         """Move by steps of odometry; while the robot stands nothing is lost or gained.
@@ -222,6 +226,34 @@ class PoseFilter:
         p[SPEED, SPEED] += noise.speed_walk**2 * stretch.moving
         p[STEERING, STEERING] += noise.steering_walk**2 * stretch.moving
         return stretch.moving
+
+    def supposing(self, landmark: Landmark, place: Point) -> PoseFilter | None:
+        """A copy that does not know where ``landmark`` stands, and begins with ``place``.
+
+        None where the error of its place is no state.
+        """
+        at = self._places.get(landmark.id)
+        if at is None:
+            return None
+        other = self.copy()
+        part = slice(at, at + 2)
+        other.state[part] = place[0] - landmark.x, place[1] - landmark.y
+        other.covariance[part] = 0.0
+        other.covariance[:, part] = 0.0
+        other.covariance[at, at] = other.covariance[at + 1, at + 1] = _ANYWHERE**2
+        return other
+
+    def shift_of(self, number: int) -> tuple[Point, float] | None:
+        """How far a landmark stands from its place in the map, and how well that is known (m).
+
+        None where that is no state.
+        """
+        at = self._places.get(number)
+        if at is None:
+            return None
+        (xx, xy), (_, yy) = self.covariance[at : at + 2, at : at + 2].tolist()
+        dx, dy = self.state[at : at + 2].tolist()
+        return (dx, dy), largest_sigma(xx, xy, yy)
 
     def innovation(self, measurement: RangeBearing, landmark: Landmark) -> Innovation:
         """Compare a measurement with the state, which must have been predicted to its stamp."""

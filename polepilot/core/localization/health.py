@@ -22,6 +22,9 @@ _SUSPICION = 10.0
 """Seconds for which a landmark that contradicted has to be in its place to be believed."""
 _KNOWN = 0.045
 """Metres to which the best of these few must be known."""
+_SETTLED, _VAGUER = 3.0, 0.065
+"""So many seconds after it was seen last, what has been learnt of its place since is as good as it
+gets: it may be known to so many metres only."""
 _SPAN = 2.0
 """Seconds between the first and the last of them: more than one pass of the camera."""
 _MEMORY = 60.0
@@ -30,6 +33,8 @@ _SCATTER = 0.12
 _SIGMAS = 2.0
 _SHIFT, _SIGNIFICANT = 0.12, 3.0
 """A landmark was moved by so many metres, and standard deviations, at least."""
+_STRIKING = 6.0
+"""The same where that place has been learnt since: with it goes all that the filter believes."""
 _PAUSE = 1.0
 """Seconds between two rows of sightings."""
 _SUREST = 0.01
@@ -74,6 +79,7 @@ class LandmarkHealth:
 
     landmarks: Mapping[int, Landmark]
     _places: dict[int, deque[tuple[float, Point, float]]] = field(default_factory=dict)
+    _aside: dict[int, deque[tuple[float, Point, float]]] = field(default_factory=dict)
     _agreed: dict[int, int] = field(default_factory=dict)
     moved: dict[int, Point] = field(default_factory=dict)
     """Landmarks found displaced, and by how much; they are not to be used."""
@@ -97,24 +103,31 @@ class LandmarkHealth:
             return None
         return self._verdict(number)
 
-    def witnessed(self, witness: int) -> list[Verdict]:
+    def witnessed(
+        self, witness: int, stamp: float = 0.0, shifts: Sequence[tuple[int, Point, float]] = ()
+    ) -> list[Verdict]:
         """``witness`` stands where it should, seen after others that do not.
 
         The pose was right before they were seen (`contradicted` is told so) and is right after:
-        a few sightings of them are enough.
+        a few sightings of them are enough. ``shifts``: what has been learnt since of how far some
+        of them are displaced, and how well that is known.
         """
-        suspects = [
-            number
-            for number, places in self._places.items()
-            if number != witness
-            and len(places) >= _WITNESSED
-            and min(sigma for _, _, sigma in places) <= _KNOWN
-        ]
-        verdicts = [self._verdict(number) for number in suspects]
+        since = {number: (shift, sigma) for number, shift, sigma in shifts}
+        verdicts = []
+        for number, places in list(self._places.items()):
+            if number == witness or len(places) < _WITNESSED:
+                continue
+            known = min(sigma for _, _, sigma in places)
+            learnt = since.get(number)
+            if learnt is not None and learnt[1] >= known:
+                learnt = None
+            allowed = _KNOWN if stamp - places[-1][0] < _SETTLED or learnt is None else _VAGUER
+            if (known if learnt is None else learnt[1]) <= allowed:
+                verdicts.append(self._verdict(number, learnt))
         return [verdict for verdict in verdicts if verdict is not None]
 
-    def _verdict(self, number: int) -> Verdict | None:
-        """On what was collected, if that agrees on a new place."""
+    def _verdict(self, number: int, learnt: tuple[Point, float] | None = None) -> Verdict | None:
+        """On what was collected, if that agrees on a new place; which is, if better, ``learnt``."""
         places = list(self._places[number])
         points = np.array([point for _, point, _ in places])
         sigmas = np.array([sigma for _, _, sigma in places])
@@ -125,10 +138,15 @@ class LandmarkHealth:
         centre = int(np.lexsort((-sigmas, near.sum(axis=1)))[-1])
         if 2 * int(near[centre].sum()) <= len(places):
             return None
-        middle, sigma = _middle([places[index] for index in np.flatnonzero(near[centre])])
         mark = self.landmarks[number]
+        if learnt is None:
+            middle, sigma = _middle([places[index] for index in np.flatnonzero(near[centre])])
+        else:
+            ((dx, dy), sigma) = learnt
+            middle = mark.x + dx, mark.y + dy
         dx, dy = middle[0] - mark.x, middle[1] - mark.y
-        if math.hypot(dx, dy) < max(_SHIFT, _SIGNIFICANT * sigma):
+        least = _SIGNIFICANT if learnt is None else _STRIKING
+        if math.hypot(dx, dy) < max(_SHIFT, least * sigma):
             return None
         self._places.pop(number)
         if self.stands_another(number, middle):
@@ -160,9 +178,13 @@ class LandmarkHealth:
         del self.moved[number], self._agreed[number]
         return True
 
-    def forget(self) -> None:
-        """The pose itself was wrong: what contradicted it says nothing of the landmarks."""
-        self._places.clear()
+    def set_aside(self) -> None:
+        """The pose itself seems wrong: then what contradicted it says nothing of the landmarks."""
+        self._aside, self._places = self._places, {}
+
+    def restore(self) -> None:
+        """It was right."""
+        self._places, self._aside = self._aside, {}
 
 
 def _middle(places: Sequence[tuple[float, Point, float]]) -> tuple[Point, float]:

@@ -11,7 +11,7 @@ with it bring it back. So it costs little to be quick in giving up.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 
 from polepilot.core.geometry import Point, Pose2D
@@ -32,7 +32,7 @@ from polepilot.core.localization.search import FixSearch
 from polepilot.core.localization.settings import LocalizerSettings as LocalizerSettings
 from polepilot.core.localization.settings import Method as Method
 from polepilot.core.localization.suspicion import Suspected, Suspicion
-from polepilot.core.localization.track import Filter, Track
+from polepilot.core.localization.track import Filter, Sighting, Track
 from polepilot.core.observation import Odometry, PoseEstimate, RangeBearing, Status
 from polepilot.core.vehicle import Vehicle
 
@@ -241,7 +241,7 @@ class Localizer:
             track = given_up.track
             track.moving = 0.0
             self._accept(track)
-            self._books.open(stamp, {m.landmark for m in picture})
+            self._books.reopen(stamp, {m.landmark for m in picture})
             self._measured = (stamp, track.filter.pose)
             self._events.add(LocalizerEvent(stamp, "resumed", "The landmarks agree with it again."))
             return
@@ -269,22 +269,31 @@ class Localizer:
         if len(found.landmarks) == 2 and trial.refusal(stamp):
             return False
         started = self._filter.copy()
-        sightings = [(m, self._landmarks[m.landmark]) for m in self._search.used]
-        share = started.begin(found, stamp, sightings, self._history)
+        sightings = self._marked(self._search.used)
+        refused = started.begin(found, stamp, sightings, self._history)
         track = Track(started, stamp, self.settings.tolerance)
+        share = 1.0 - len(refused) / max(len(sightings), 1)
         if share < _FITTING or track.sigma > self.settings.degraded_sigma:
             # The stricter gate left some of them out: they do not fit together so well.
             self._search.refuse("The landmarks seen so far do not fit together well enough.")
             return False
         self._before = (stamp, self._filter, self._history.following)
-        trial.begin(found.landmarks, self._search.used)
+        # One that the filter would not take was no part of it.
+        agreed = [n for n in found.landmarks if not _mostly(n, refused, self._search.used)]
+        if len(agreed) < 2:
+            agreed = list(found.landmarks)
+        trial.begin(agreed, self._search.used)
+        outsiders, before = self._search.appearing(found, stamp, agreed), self._filter
         self._accept(track)
-        books.open(stamp, found.landmarks)
-        if trial.over:
-            # Of a landmark that was seen before all others the robot may have been taken away.
-            since = -math.inf if on_trial else self._search.used[0].stamp
-            for outside in (one for one in self._search.outside if one[1] >= since):
-                books.contradicted(*outside)
+        books.open(stamp, agreed)
+        # Of a landmark that was seen before all others the robot may have been taken away.
+        since = -math.inf if on_trial else self._search.used[0].stamp
+        against = [
+            ((m, self._landmarks[m.landmark]), place)
+            for m, place, sigma in outsiders
+            if m.stamp >= since and books.displaced(m, place, sigma)
+        ]
+        track.supposed.start(before, found, stamp, sightings, against, self._history)
         self._measured = (stamp, found.pose)
         ids = ", ".join(str(number) for number in found.landmarks)
         code = "refixed" if self._fixes else "fixed"
@@ -298,6 +307,9 @@ class Localizer:
         self._ahead = self._given_up = None
         self._belief.accept(self._books.trial.unconfirmed)
         self._search.clear()
+
+    def _marked(self, measurements: Iterable[RangeBearing]) -> list[Sighting]:
+        return [(m, self._landmarks[m.landmark]) for m in measurements]
 
     # ---- following it ------------------------------------------------------------------------
 
@@ -314,8 +326,11 @@ class Localizer:
         predicted = track.filter.pose
         self._predicted = (stamp, predicted)
         kept = track.keep()
-        taken = [m for m in picture if self._books.take(track, m)]
-        kept += [(m, self._landmarks[m.landmark]) for m in taken]
+        taken = [m for m in picture if books.take(track, m)]
+        kept += self._marked(taken)
+        if track.supposed:
+            rest = self._marked(m for m in picture if m not in taken)
+            track.supposed.follow(self._history, stamp, kept, rest, track.tolerance)
         ranged = [m for m in taken if math.isfinite(m.range_sigma)]
         if ranged:
             best = min(ranged, key=lambda m: m.range_sigma)
@@ -378,3 +393,8 @@ class Localizer:
         belief, known = self._belief, (track.moving, track.sigma)
         belief.judge(track.stamp, *known, doubted, reason, trial.unconfirmed)
         return suspected
+
+
+def _mostly(number: int, refused: Sequence[RangeBearing], used: Sequence[RangeBearing]) -> bool:
+    """Whether most of a landmark's sightings were refused."""
+    return 2 * sum(m.landmark == number for m in refused) > sum(m.landmark == number for m in used)

@@ -92,11 +92,17 @@ class RadialFilter:
         stamp: float,
         sightings: Sequence[tuple[RangeBearing, Landmark]],
         history: OdometryHistory,
-    ) -> float:
+    ) -> list[RangeBearing]:
         """Start at a fix; the sightings behind it say no more than it does itself."""
         del stamp, sightings, history
         self.reset(found.pose, found.covariance)
-        return 1.0
+        return []
+
+    def supposing(self, landmark: Landmark, place: Point) -> None:
+        """The paper has no such thing."""
+
+    def shift_of(self, number: int) -> None:
+        """Likewise."""
 
     def reset(self, pose: Pose2D, covariance: NDArray[np.float64]) -> None:
         self.pose = pose

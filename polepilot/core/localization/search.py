@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from polepilot.core.geometry import Point, Pose2D
@@ -46,9 +46,6 @@ class FixSearch:
 
     used: tuple[RangeBearing, ...] = ()
     """The sightings behind the last fix, as they were measured, oldest first."""
-    outside: tuple[tuple[int, float, Point, float], ...] = ()
-    """Sightings that contradict it: which landmark, when, where in `map` it appears, and how well
-    that is known, metres."""
 
     def clear(self) -> None:
         self._sightings.clear()
@@ -125,19 +122,25 @@ class FixSearch:
             )
             return None
         self.used = tuple(m for m in chosen if m.landmark in answer.landmarks)
-        self.outside = tuple(
-            (
-                m.landmark,
-                m.stamp,
-                answer.pose.to_parent(
-                    mount.to_parent((m.range * math.cos(m.bearing), m.range * math.sin(m.bearing)))
-                ),
-                math.hypot(m.range_sigma, m.range * m.bearing_sigma),
-            )
-            for m, mount in zip(kept, mounts, strict=True)
-            if m.landmark in answer.outliers
-        )
         return answer
+
+    def appearing(
+        self, found: Fix, stamp: float, but: Collection[int]
+    ) -> list[tuple[RangeBearing, Point, float]]:
+        """Where the window's landmarks appear by a fix, those of ``but`` left out.
+
+        The sighting, where in `map`, and how well that is known, metres; oldest first.
+        """
+        chosen = self._chosen(stamp, stamp - self.window)
+        kept, mounts = self._carried(chosen, stamp)
+        rows = []
+        for seen, m, mount in zip(chosen[len(chosen) - len(kept) :], kept, mounts, strict=True):
+            if m.landmark not in but:
+                ahead = m.range * math.cos(m.bearing), m.range * math.sin(m.bearing)
+                place = found.pose.to_parent(mount.to_parent(ahead))
+                sigma = math.hypot(m.range_sigma, m.range * m.bearing_sigma)
+                rows.append((seen, place, sigma))
+        return rows
 
     def _carried(
         self, chosen: list[RangeBearing], stamp: float

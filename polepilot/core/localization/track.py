@@ -19,6 +19,7 @@ from polepilot.core.landmark import Landmark
 from polepilot.core.localization.doubt import largest_sigma
 from polepilot.core.localization.fix import Fix
 from polepilot.core.localization.odometry import Following, OdometryHistory, Step
+from polepilot.core.localization.supposed import Supposed
 from polepilot.core.localization.suspicion import MapMisfit
 from polepilot.core.observation import RangeBearing
 
@@ -48,7 +49,9 @@ class Filter(Protocol):
     def map_misfit(self) -> MapMisfit: ...
     def begin(
         self, found: Fix, stamp: float, sightings: Sequence[Sighting], history: OdometryHistory
-    ) -> float: ...
+    ) -> Sequence[RangeBearing]: ...
+    def supposing(self, landmark: Landmark, place: Point) -> Filter | None: ...
+    def shift_of(self, number: int) -> tuple[Point, float] | None: ...
     def predict(self, steps: Iterable[Step]) -> float: ...
     def take(
         self, measurement: RangeBearing, landmark: Landmark, tolerance: float
@@ -75,6 +78,7 @@ class Track:
         self.filter = filtered
         self.tolerance = tolerance
         self.stamp = stamp
+        self.supposed = Supposed()
         self.moving = 0.0
         """Seconds of motion since the last correction."""
         self.moved = -1e9
@@ -136,6 +140,7 @@ class Track:
             history.retune(after)
             for filtered in (self.filter, *(moment.filter for moment in self._moments)):
                 filtered.retuned(by)
+            self.supposed.retuned(by)
 
     def rewind(self, stamp: float, history: OdometryHistory) -> list[_Moment] | None:
         """Go back to ``stamp``; answers what was applied since, or None where that is too far."""

@@ -22,7 +22,7 @@ from polepilot.core.planning.space import FreeSpace
 from polepilot.core.planning.swept import SMALLEST_PATCH
 from polepilot.core.planning.target import Target
 from polepilot.core.planning.track import without_jerks
-from polepilot.core.planning.visits import with_visits
+from polepilot.core.planning.visits import Vain, with_visits
 from polepilot.core.planning.wording import in_words
 
 Gears = NDArray[np.int8]
@@ -61,10 +61,11 @@ def driven_path(
     if len(path) > 1:
         smallest = (_LEAST if whole else _CRUMB) * target.tool**2
         radius = driver.track.radius
-        driven = _visited(*driven, space, radius, target, smallest)
-        longer = _passed(*driven, driver, space, options, target)
+        vain = Vain()
+        driven = _visited(*driven, space, radius, target, smallest, vain)
+        longer = _passed(*driven, driver, space, options, target, vain)
         if longer is not None:
-            driven = _visited(*longer, space, radius, target, smallest)
+            driven = _visited(*longer, space, radius, target, smallest, Vain())
     path, gear, parts, missed = driven
     left = float(missed.area)
     if left > max(0.02 * target.area, _SAID):
@@ -119,13 +120,14 @@ def _visited(
     radius: float,
     target: Target,
     smallest: float,
+    vain: Vain,
 ) -> Driven:
     """The path with visits to what it misses, and to what those miss."""
     enough = _ENOUGH * target.area
     for _ in range(2):
         before = len(path)
         path, gear, parts, missed = with_visits(
-            path, gear, parts, target, space, radius, smallest, enough, missed
+            path, gear, parts, target, space, radius, smallest, enough, missed, vain
         )
         if len(path) == before:
             break
@@ -141,12 +143,14 @@ def _passed(
     space: FreeSpace,
     options: PlanOptions,
     target: Target,
+    vain: Vain,
 ) -> Driven | None:
     """The path with passes at its end over what lies too far from it for visits; None: nothing.
 
     ``driver`` stands where the path ends.
     """
     more = cleanup_strokes(missed, target.tool, space, _WORTH * target.tool**2)
+    more = [stroke for stroke in more if not vain.holds_both(stroke.points)]
     if not more:
         return None
     last, recorder = driver.track.last, Recorder()

@@ -32,6 +32,8 @@ _MOST_CORNERS = 400
 _SQUARE = 0.03
 _MOST_SQUARES = 1_000_000
 """Side of the squares in which points are looked up, m; it is longer where there would be more."""
+_GLANCES = np.arange(1, 17) / 17
+"""Where on a line of sight points are looked at first."""
 STRIDE = 4
 """Of the points of curves every so-manieth is looked at first."""
 _FEW = 8
@@ -225,14 +227,15 @@ class FreeSpace:
     def _graph(self, coarser: float) -> _Graph:
         """Corners of the free space that point into it; shortest paths bend only there.
 
-        First the finest ones that are not too many, later (a finite ``coarser``) all of them.
+        First the finest ones that are not too many, then finer ones than ``coarser``, at last all
+        of them.
         """
-        if not math.isinf(coarser):
+        if coarser <= _TOLERANCES[0]:
             return _graph_of(0.0, self.polygon)
         for tolerance in _TOLERANCES:
             inner = self.polygon.buffer(-tolerance / 2, join_style="mitre").simplify(tolerance / 2)
             chosen = _graph_of(tolerance, inner)
-            if len(chosen.nodes) <= _MOST_CORNERS:
+            if not math.isinf(coarser) or len(chosen.nodes) <= _MOST_CORNERS:
                 break
         return chosen
 
@@ -250,6 +253,8 @@ class FreeSpace:
             useful &= _touched(sights, graph.arms[index])
         lengths = np.hypot(*sights.T)
         near = np.flatnonzero(useful & (lengths > 1e-9))
+        # Most lines of sight are blocked, of which a few points on them tell.
+        near = near[self.holds_rows(here + _GLANCES[:, None] * sights[near][:, None])]
         pairs = np.stack([np.broadcast_to(here, (len(near), 2)), graph.nodes[near]], axis=1)
         seen = near[shapely.covers(self._loose, shapely.linestrings(pairs))]
         return seen, lengths[seen]

@@ -7,14 +7,14 @@ whatever leads to a place leads from it as well.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely import LineString, MultiPolygon, Polygon
 
-from polepilot.core.geometry import Pose2D
+from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.plan import PlanPart
 from polepilot.core.planning.curves import Curve, curve_length, drive, joined, sample
 from polepilot.core.planning.offset import cleanup_strokes
@@ -42,6 +42,8 @@ _LEVELS = 4
 """So many short pieces may be in a way to a place before the curve at its end."""
 _MOST_VISITS = 300
 _MOST_FAILURES = 25
+_BESIDE = 0.03
+"""Places nearer to each other than this are the same when a way is looked for, metres."""
 
 
 def with_visits(
@@ -54,18 +56,19 @@ def with_visits(
     smallest: float,
     enough: float,
     missed: MultiPolygon,
+    vain: Vain | None = None,
 ) -> tuple[Points, Gears, tuple[PlanPart, ...], MultiPolygon]:
     """The path with visits to patches that it misses, the largest first; and what it misses then.
 
     ``missed``: what it misses now. ``radius``: of the arcs that are driven, metres. ``smallest``:
     patches smaller than this are left, m²; and so are all others as soon as they make up less than
-    ``enough``.
+    ``enough``. ``vain``: where no way was found before.
     """
     patches = patches_of(missed, smallest)
     left = sum(float(patch.area) for patch in patches)
     if left <= enough:
         return path, gear, parts, missed
-    visitor = _Visitor(path, gear, space, target.tool, radius)
+    visitor = _Visitor(path, gear, space, target.tool, radius, Vain() if vain is None else vain)
     for patch in sorted(patches, key=lambda p: (-float(p.area), p.bounds)):
         if left <= enough or visitor.hopeless:
             break
@@ -74,6 +77,25 @@ def with_visits(
     if visitor.visits:
         missed = target.still_missed(missed, *(visit.points for visit in visitor.visits))
     return *visitor.result(parts), missed
+
+
+@dataclass(slots=True)
+class Vain:
+    """Places, and lines from one to another, to which no way was found: who looks for one a hand's
+    breadth beside, or again, finds none either, and finding none takes longest."""
+
+    ends: list[tuple[Point, Point]] = field(default_factory=list)
+
+    def holds(self, first: Point, last: Point) -> bool:
+        """Whether a line, or a place (both ends), is one of them."""
+        return any(
+            math.dist(first, a) < _BESIDE and math.dist(last, b) < _BESIDE for a, b in self.ends
+        )
+
+    def holds_both(self, points: Points) -> bool:
+        """Whether no way to a line was found from either of its ends."""
+        first, last = ((float(x), float(y)) for x, y in points[[0, -1]])
+        return self.holds(first, last) and self.holds(last, first)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,13 +114,20 @@ class _Visitor:
     """A path while visits are added to it."""
 
     def __init__(
-        self, path: Points, gear: Gears, space: FreeSpace, tool: float, radius: float
+        self,
+        path: Points,
+        gear: Gears,
+        space: FreeSpace,
+        tool: float,
+        radius: float,
+        vain: Vain,
     ) -> None:
         self._path = path
         self._gear = gear
         self._space = space
         self._tool = tool
         self._radius = radius
+        self._vain = vain
         self._poses = _poses(path, gear)
         self._sorted = np.argsort(self._poses[:, 0], kind="stable")
         self._columns = self._poses[self._sorted, 0]
@@ -145,8 +174,12 @@ class _Visitor:
             return True
         circle = shapely.maximum_inscribed_circle(place, tolerance=0.002)
         x, y = (float(value) for value in shapely.get_coordinates(circle)[0])
+        if self._vain.holds((x, y), (x, y)):
+            return False
         near = self._near(x, y)
         found = way_to_place(self._space, self._poses[near], self._radius, (x, y), _LEVELS)
+        if found is None:
+            self._vain.ends.append(((x, y), (x, y)))
         return self._added(near, found, ())
 
     def _pass(self, points: Points) -> bool:
@@ -155,9 +188,12 @@ class _Visitor:
         length = math.dist(first, last)
         best: tuple[float, Indices, tuple[int, Curve], Curve] | None = None
         for a, b in ((first, last), (last, first)):
+            if self._vain.holds(a, b):
+                continue
             near = self._near(*a)
             found = way_to_line(self._space, self._poses[near], self._radius, a, b, _LEVELS)
             if found is None:
+                self._vain.ends.append((a, b))
                 continue
             cost = curve_length(found[1])
             if best is None or cost < best[0]:

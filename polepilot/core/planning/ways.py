@@ -8,6 +8,7 @@ worked out: an arc and a straight piece to a place, or two arcs onto a line.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polepilot.core.geometry import Point, Pose2D
-from polepilot.core.planning.curves import CHANGE, Curve, columns, joined, sample, spots
+from polepilot.core.planning.curves import CHANGE, KIND, Curve, joined, sample, spots
 from polepilot.core.planning.space import FreeSpace
 
 Array = NDArray[np.float64]
@@ -74,20 +75,26 @@ class _States:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class _End:
-    """A curve that leads from a state to the goal."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Ends:
+    """Curves that lead from states to the goal, the cheapest first."""
 
-    row: int
-    cost: float
-    curve: Curve
+    rows: Indices
+    """Of the states."""
+    sides: Array
+    lengths: Array
+    """See ``curves.columns``."""
+
+    def curve(self, index: int) -> Curve:
+        pieces = zip(self.sides[index].tolist(), self.lengths[index].tolist(), strict=True)
+        return tuple((KIND[side], length) for side, length in pieces)
 
 
 @dataclass(frozen=True, slots=True)
 class _Goal:
     """Where to, as a search asks for it."""
 
-    ends: Callable[[_States], list[_End]]
+    ends: Callable[[_States], _Ends]
     """The cheapest last curves from some states."""
     promise: Callable[[_States], Array]
     """How far the goal is from each of them, about, metres."""
@@ -108,7 +115,7 @@ def way_to_place(
     """
     x, y = place
 
-    def ends(here: _States) -> list[_End]:
+    def ends(here: _States) -> _Ends:
         return _ends_at(here, x, y, radius)
 
     def promise(here: _States) -> Array:
@@ -130,7 +137,7 @@ def way_to_line(
     length = math.dist(first, last)
     cos, sin = math.cos(heading), math.sin(heading)
 
-    def ends(here: _States) -> list[_End]:
+    def ends(here: _States) -> _Ends:
         return _ends_on(here, first, heading, radius)
 
     def promise(here: _States) -> Array:
@@ -178,14 +185,12 @@ def _checked(
 ) -> tuple[int, Curve] | None:
     """The cheapest curve to the goal from the last states of a trail that is free all the way."""
     states = trail[-1]
-    ends = sorted(goal.ends(states), key=lambda end: (round(end.cost, 6), end.row))
-    if not ends:
-        return None
-    rows = np.array([end.row for end in ends], dtype=np.intp)
+    ends = goal.ends(states)
+    rows = ends.rows
     poses = np.stack([states.x[rows], states.y[rows], states.heading[rows]], axis=1)
-    points = spots(poses, *columns([end.curve for end in ends]), radius)
+    points = spots(poses, ends.sides, ends.lengths, radius)
     for index in np.flatnonzero(space.holds_rows(points))[:_MOST_CHECKS].tolist():
-        start, curve = _traced(trail, ends[index].row, ends[index].curve, step)
+        start, curve = _traced(trail, int(rows[index]), ends.curve(index), step)
         first = trail[0]
         pose = Pose2D(float(first.x[start]), float(first.y[start]), float(first.heading[start]))
         if space.holds_points(sample(pose, curve, radius)[0]):
@@ -203,84 +208,71 @@ def _traced(trail: list[_States], row: int, end: Curve, step: float) -> tuple[in
     return row, joined((*pieces[::-1], *end))
 
 
-def _changed(states: _States, sign: float) -> Array:
+def _changed(states: _States, sign: Array) -> Array:
     """What a change of gear costs those that went the other way before."""
     return np.where((states.move >= 0) & ((states.move % 2 == 0) != (sign > 0)), CHANGE, 0.0)
 
 
-def _ends_at(states: _States, x: float, y: float, radius: float) -> list[_End]:
+def _signs(count: int) -> list[Array]:
+    """All ways in which so many things may be 1 or -1, as columns."""
+    return list(np.array(list(itertools.product((1.0, -1.0), repeat=count))).T[:, :, None])
+
+
+def _ends_at(states: _States, x: float, y: float, radius: float) -> _Ends:
     """An arc, and straight on to a place."""
+    side, sign = _signs(2)
     ahead, aside = states.local(x, y)
-    found: list[_End] = []
-    for kind, side in (("L", 1.0), ("R", -1.0)):
-        for sign in (1.0, -1.0):
-            # Where the place lies as seen from the middle of the circle to that side.
-            along, across = sign * ahead, side * aside - radius
-            square = along**2 + across**2 - radius**2
-            rest = np.sqrt(np.maximum(square, 0.0))
-            turn = (np.arctan2(across, along) + np.arctan2(radius, rest)) % math.tau
-            turn = np.where(turn > math.tau - 1e-6, 0.0, turn)
-            good = (square >= 0) & (turn < 0.75 * math.pi)
-            good &= _driven(turn * radius) & _driven(rest)
-            cost = states.cost + turn * radius + rest + _changed(states, sign)
-            found += [
-                _End(
-                    row,
-                    float(cost[row]),
-                    ((kind, sign * radius * float(turn[row])), ("S", sign * float(rest[row]))),
-                )
-                for row in _best(good, cost)
-            ]
-    return found
+    # Where the place lies as seen from the middle of the circle to that side.
+    along, across = sign * ahead, side * aside - radius
+    square = along**2 + across**2 - radius**2
+    rest = np.sqrt(np.maximum(square, 0.0))
+    turn = (np.arctan2(across, along) + np.arctan2(radius, rest)) % math.tau
+    turn = np.where(turn > math.tau - 1e-6, 0.0, turn)
+    good = (square >= 0) & (turn < 0.75 * math.pi)
+    good &= _driven(turn * radius) & _driven(rest)
+    cost = states.cost + turn * radius + rest + _changed(states, sign)
+    sides = np.stack(np.broadcast_arrays(side, 0.0), axis=-1)
+    return _cheapest(good, cost, sides, np.stack([sign * radius * turn, sign * rest], axis=-1))
 
 
-def _ends_on(states: _States, first: Point, heading: float, radius: float) -> list[_End]:
+def _ends_on(states: _States, first: Point, heading: float, radius: float) -> _Ends:
     """Two arcs onto a line, and along it to its first place."""
-    found: list[_End] = []
-    for about in (0.0, math.pi):
-        for sign in (1.0, -1.0):
-            # As seen along the way that is driven: forward where it looks, backward its back.
-            way = heading + about + (0.0 if sign > 0 else math.pi)
-            cos, sin = math.cos(way), math.sin(way)
-            along = cos * (states.x - first[0]) + sin * (states.y - first[1])
-            across = -sin * (states.x - first[0]) + cos * (states.y - first[1])
-            askew = (states.heading - heading - about + math.pi) % math.tau - math.pi
-            for side in (1.0, -1.0):
-                middle = (1 + np.cos(askew) + side * across / radius) / 2
-                back = np.arccos(np.clip(middle, -1.0, 1.0))
-                turn = back - side * askew
-                met = along + side * radius * (2 * np.sin(side * back) - np.sin(askew))
-                good = (np.abs(middle) <= 1) & (turn >= 0) & (turn < 0.75 * math.pi)
-                good &= _driven(turn * radius) & _driven(back * radius) & _driven(np.abs(met))
-                cost = states.cost + radius * (turn + back) + np.abs(met)
-                cost = cost + _changed(states, sign) + CHANGE * (met > 0)
-                kinds = ("L", "R") if side * sign > 0 else ("R", "L")
-                found += [
-                    _End(
-                        row,
-                        float(cost[row]),
-                        (
-                            (kinds[0], sign * radius * float(turn[row])),
-                            (kinds[1], sign * radius * float(back[row])),
-                            ("S", -sign * float(met[row])),
-                        ),
-                    )
-                    for row in _best(good, cost)
-                ]
-    return found
+    ahead, sign, side = _signs(3)
+    about = np.where(ahead > 0, 0.0, math.pi)
+    # As seen along the way that is driven: forward where it looks, backward its back.
+    way = heading + about + np.where(sign > 0, 0.0, math.pi)
+    cos, sin = np.cos(way), np.sin(way)
+    along = cos * (states.x - first[0]) + sin * (states.y - first[1])
+    across = -sin * (states.x - first[0]) + cos * (states.y - first[1])
+    askew = (states.heading - heading - about + math.pi) % math.tau - math.pi
+    middle = (1 + np.cos(askew) + side * across / radius) / 2
+    back = np.arccos(np.clip(middle, -1.0, 1.0))
+    turn = back - side * askew
+    met = along + side * radius * (2 * np.sin(side * back) - np.sin(askew))
+    good = (np.abs(middle) <= 1) & (turn >= 0) & (turn < 0.75 * math.pi)
+    good &= _driven(turn * radius) & _driven(back * radius) & _driven(np.abs(met))
+    cost = states.cost + radius * (turn + back) + np.abs(met)
+    cost = cost + _changed(states, sign) + CHANGE * (met > 0)
+    sides = np.stack(np.broadcast_arrays(side * sign, -side * sign, 0.0), axis=-1)
+    arcs = sign * radius
+    return _cheapest(good, cost, sides, np.stack([arcs * turn, arcs * back, -sign * met], axis=-1))
+
+
+def _cheapest(good: NDArray[np.bool_], cost: Array, sides: Array, lengths: Array) -> _Ends:
+    """The cheapest of the good ones, of each kind of curve so many. ``good``, ``cost``: kinds x
+    states; ``sides``: kinds x 1 x pieces; ``lengths``: kinds x states x pieces."""
+    cost = np.where(good, np.round(cost, 6), np.inf)
+    rows = np.argsort(cost, axis=1, kind="stable")[:, : 2 * _MOST_CHECKS]
+    kinds, places = np.nonzero(np.isfinite(np.take_along_axis(cost, rows, axis=1)))
+    rows = rows[kinds, places]
+    order = np.lexsort((rows, cost[kinds, rows]))
+    kinds, rows = kinds[order], rows[order]
+    return _Ends(rows, sides[kinds, 0], lengths[kinds, rows])
 
 
 def _driven(length: Array) -> NDArray[np.bool_]:
     """Whether a piece is nothing at all, or long enough."""
     return np.asarray((length > _SHORTEST) | (length < 1e-7))
-
-
-def _best(good: NDArray[np.bool_], cost: Array) -> list[int]:
-    """The cheapest of the good rows."""
-    rows = np.flatnonzero(good)
-    order = np.argsort(np.round(cost[rows], 6), kind="stable")[: 2 * _MOST_CHECKS]
-    chosen: list[int] = rows[order].tolist()
-    return chosen
 
 
 def _moved(space: FreeSpace, states: _States, radius: float, step: float) -> _States:

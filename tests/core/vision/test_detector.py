@@ -221,6 +221,31 @@ def test_a_thing_over_two_bits_is_noticed(tone: tuple[int, int, int] | None, awa
         assert some.detect(image) == []
 
 
+def inside(n: int, first: float, end: float) -> NDArray[np.float64]:
+    """Share of each of ``n`` pixels in a row that lies between two places."""
+    at = np.arange(float(n))
+    return np.clip(np.minimum(at + 0.5, end) - np.maximum(at - 0.5, first), 0.0, 1.0)
+
+
+@pytest.mark.parametrize("tone", [12, 30, 55])
+@pytest.mark.parametrize("away", [5.0, 8.5, 10.0, 12.0, 14.0])
+def test_a_board_across_a_landmark_is_noticed_at_any_distance(away: float, tone: int) -> None:
+    for seed, number in enumerate((3, 7, 11, 13, 14, 15)):
+        image = picture([pole(number, away, 0.0)], seed)
+        one = only(image)
+        unit = (one.bottom - one.top) / 13
+        for bit in range(4):
+            if number >> bit & 1 and number != 1 << bit:
+                upper = one.top + (2.8 + 2 * bit) * unit
+                half = 1.7 * unit + 3.0
+                high = inside(image.shape[0], upper, upper + 1.4 * unit)
+                wide = inside(image.shape[1], one.column - half, one.column + half)
+                share = cv2.GaussianBlur(high[:, None] * wide, (0, 0), 0.45)[..., None]
+                covered = np.rint(image + share * (tone - image.astype(float)))
+                found = ALL.detect(covered.astype(np.uint8))
+                assert {other.id for other in found} <= {number}, (number, bit)
+
+
 ROWS = np.arange(300.0)[:, None]
 
 

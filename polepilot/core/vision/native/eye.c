@@ -204,9 +204,7 @@ static int examine(const eye_picture *picture, const eye_task *task,
                                   &doubt);
     if (reason != EYE_READ)
         return reason;
-    if (eye_covered(picture, task, &upright, &scale, &side, out->code, levels, segments,
-                    scale.noise / 2) ||
-        eye_in_front(picture, task, &upright, &scale, &side, out->code, levels, segments))
+    if (eye_in_front(picture, task, &upright, &scale, &side, out->code, levels, segments))
         return EYE_COVERED;
     out->side_noise = side.noise;
     out->sides = side.sides;

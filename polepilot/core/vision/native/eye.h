@@ -15,8 +15,7 @@
  *   read.c     the light of the segments as bits, or why they are none
  *   side.c     where the strip's middle lies between its sides
  *   ends.c     whether the end bars are there, and end
- *   cover.c    whether something dark lies over it
- *   front.c    what else speaks for something in front of a bit
+ *   front.c    whether something is in front of a bit
  *   apart.c    how much the strip stands out from what is beside it
  * eye.c runs them; internal.h is what they share. Rows and columns count from the centre of the
  * first pixel. Light is linear, 0 to 1. docs/vision.md explains the method. */

@@ -11,9 +11,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define ENOUGH 1.7      /* evidence; a piece is hardly ever more than 1 without a cover, */
+#define ENOUGH 1.85     /* evidence; a piece is hardly ever more than 1 without a cover, */
 #define MOST_OF_ONE 1.5 /* and counts no more than this */
-#define LEAST_ROWS 3.5  /* rows of a cover; of fewer there is too little to be seen */
+#define LEAST_ROWS 3.5  /* of a cover with fewer only what is certain counts */
+#define MIDST_WIDE 0.5  /* half of the midst of a bit: of the strip's, */
+#define MIDST_HIGH 0.25 /* segments; blur leaves it alone */
+#define MOST_SEEN 8     /* rows and columns of it that are kept, at the least */
 #define MOST_ROWS 512   /* of what is beside a side, */
 #define ROWS_A_UNIT 5.0 /* and how many a segment if there are many more */
 #define REACH 0.8       /* segments that it goes on above and below the code */
@@ -71,7 +74,8 @@ typedef struct {
 typedef struct {
     int first, last; /* segments */
     int top, bottom; /* the run of dark segments that they are in, and the first segment below it */
-    double level[3]; /* their mean light */
+    double level[3]; /* their mean light, */
+    double seen[3];  /* and that of their middle as it is in the picture */
 } block;
 
 static double row_of(const scene *s, double place)
@@ -141,6 +145,9 @@ static int light_between(const margin *of, int strip, double from, double to, do
     return 1;
 }
 
+/* Half of the rows in the midst of a block that are looked at, segments: what is round is widest there. */
+static double half_of(const block *over) { return MIDST_HIGH + (over->last - over->first) / 4.0; }
+
 /* How much the light beside bits, ``shift`` segments lower, differs from theirs, and by how much it
  * stands out from what is beside the ends of their dark run. 0 where that is not to be seen, or where
  * it differs by more than ``most``. A cover that leaves a code hides no bright segment by halves: it
@@ -152,15 +159,15 @@ static int look_beside(const scene *s, int way, const block *over, double shift,
     const margin *of = s->beside + way;
     double top = over->top + shift, bottom = over->bottom + shift;
     double middle = (over->first + over->last + 1) / 2.0 + shift;
-    double half = 0.4 + (over->last - over->first) / 4.0; /* what is round is widest there */
+    double half = half_of(over);
     if (!light_between(of, OFF, row_of(s, middle - half), row_of(s, middle + half), at))
         return 0;
-    *unlike = apart(s, at, over->level);
+    *unlike = apart(s, at, over->seen);
     if (*unlike > most ||
         !light_between(of, OFF, row_of(s, top - 1), row_of(s, top - 0.15), above) ||
         !light_between(of, OFF, row_of(s, bottom + 0.15), row_of(s, bottom + 1), below))
         return 0;
-    *out = fmin(apart(s, above, over->level), apart(s, below, over->level));
+    *out = fmin(apart(s, above, over->seen), apart(s, below, over->seen));
     return 1;
 }
 
@@ -306,7 +313,35 @@ static double step(const scene *s, const eye_upright *u, int from, int to)
     return room > 0 ? at_most(most / (STEP * room + STEP_SPREAD * s->usual)) : 0;
 }
 
-static block block_of(const scene *s, int first, int last)
+/* Light of the midst of the strip between two rows, as it is in the picture. */
+static void see(const eye_picture *p, const eye_upright *u, const eye_side *side, double from,
+                double to, double *light)
+{
+    int a = eye_ceil(from), b = eye_floor(to), n = 0;
+    if (b < a)
+        a = b = eye_floor((from + to) / 2 + 0.5);
+    a = eye_clamp(a, 0, p->rows - 1);
+    b = eye_clamp(b, 0, p->rows - 1);
+    int down = (b - a) / MOST_SEEN + 1;
+    for (int y = a; y <= b; y += down) {
+        double middle = side->column + u->lean * (y - u->row), half = MIDST_WIDE * side->half;
+        int left = eye_ceil(middle - half), right = eye_floor(middle + half);
+        if (right < left)
+            left = right = eye_floor(middle + 0.5);
+        int across = (right - left) / MOST_SEEN + 1;
+        for (int x = left; x <= right; x += across, n++) {
+            const uint8_t *pixel =
+                p->pixels + y * p->stride + eye_clamp(x, 0, p->columns - 1) * p->channels;
+            for (int c = 0; c < p->channels; c++)
+                light[c] += eye_linear(pixel[c]);
+        }
+    }
+    for (int c = 0; c < p->channels; c++)
+        light[c] /= n;
+}
+
+static block block_of(const scene *s, const eye_picture *p, const eye_upright *u, const eye_side *side,
+                      int first, int last)
 {
     block over = {.first = first, .last = last, .top = first, .bottom = last + 1};
     int inner = last > first; /* its edges are lightened by what is above and below */
@@ -317,6 +352,8 @@ static block block_of(const scene *s, int first, int last)
         over.top--;
     while (s->code[last] == '0' && s->code[over.bottom] == '0')
         over.bottom++;
+    double middle = (first + last + 1) / 2.0, half = half_of(&over);
+    see(p, u, side, row_of(s, middle - half), row_of(s, middle + half), over.seen);
     return over;
 }
 
@@ -335,6 +372,22 @@ static double evidence_of(const scene *s, const eye_upright *u, const block *ove
             evidence += step(s, u, over->top, over->bottom);
     }
     return s->coloured && evidence <= ENOUGH ? evidence + swells(s, over) : evidence;
+}
+
+/* Whether something stands in front of these bits and of what is between them. */
+static int is_over(const scene *s, const eye_picture *p, const eye_upright *u, const eye_side *side,
+                   int first, int last)
+{
+    block over = block_of(s, p, u, side, first, last);
+    double rows = s->scale->unit * ((last - first) / 2.0 + 1); /* with half of what is between bits */
+    if ((rows < LEAST_ROWS ? goes_on(s, &over) : evidence_of(s, u, &over)) > ENOUGH)
+        return 1;
+    if (last == first)
+        return 0;
+    /* What is seen for certain over one of them is enough. */
+    block upper = block_of(s, p, u, side, first, first);
+    block lower = block_of(s, p, u, side, last, last);
+    return goes_on(s, &upper) > ENOUGH || goes_on(s, &lower) > ENOUGH;
 }
 
 /* Whether something stands in front of a bit, which makes one landmark of another. */
@@ -368,8 +421,7 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
         for (int last = i; last < segments - 3; last += 2) {
             if (last > i && (code[i] == '1' || code[last] == '1'))
                 break;
-            double length = (last - i) / 2.0 + 1; /* with half of what is above and below */
-            if (scale->unit * length < LEAST_ROWS || !eye_mistakable(task, code, segments, i, last))
+            if (!eye_mistakable(task, code, segments, i, last))
                 continue;
             if (!filled) {
                 for (int way = 0; way < 2; way++)
@@ -380,14 +432,8 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
                     know_sides(&s, task);
                 filled = 1;
             }
-            block over = block_of(&s, i, last);
-            if (evidence_of(&s, u, &over) > ENOUGH)
+            if (is_over(&s, p, u, side, i, last))
                 return 1;
-            if (last == i || scale->unit < LEAST_ROWS)
-                continue;
-            block upper = block_of(&s, i, i), lower = block_of(&s, last, last);
-            if (goes_on(&s, &upper) > ENOUGH || goes_on(&s, &lower) > ENOUGH)
-                return 1; /* what is seen for certain over one of them is enough */
         }
     return 0;
 }

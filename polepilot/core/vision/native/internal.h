@@ -83,9 +83,6 @@ int eye_fit_side(const eye_picture *picture, const eye_upright *upright, double 
 int eye_look_at_ends(const eye_picture *picture, const eye_upright *upright,
                      const eye_scale *scale, const eye_side *side, const char *code,
                      double levels[][EYE_LIGHTS], int segments, double *doubt);
-int eye_covered(const eye_picture *picture, const eye_task *task, const eye_upright *upright,
-                const eye_scale *scale, const eye_side *side, const char *code,
-                double levels[][EYE_LIGHTS], int segments, double noise);
 double eye_apart(const eye_picture *picture, const eye_upright *upright, const eye_scale *scale,
                  const eye_side *side, const char *code, int segments);
 int eye_in_front(const eye_picture *picture, const eye_task *task, const eye_upright *upright,

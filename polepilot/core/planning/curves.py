@@ -192,18 +192,20 @@ def best_curves(
 def _curves(goals: Array, change: float, most: int, radius: float) -> Curves:
     """The ``most`` best for radius 1 to each of N goals x, y, heading; then of another radius."""
     with np.errstate(invalid="ignore"):  # what is no number is no curve
-        kinds, lengths = _words(*goals.T)
-        cost = np.abs(lengths).sum(axis=2)
-        forward = np.zeros(cost.shape)
-        for piece in range(lengths.shape[2]):
-            length = lengths[:, :, piece]
-            way = np.where(np.abs(length) > 1e-6, np.sign(length), forward)
-            cost += change * ((forward != 0) & (way != forward))
-            forward = way
-        good = _arrive(kinds, lengths, goals) & (cost > 1e-7)
-    words, of = np.nonzero(good)
-    lengths, cost = lengths[words, of], np.round(cost[words, of], 9)
+        kinds, every = _words(*goals.T)
+    words, of = np.nonzero(np.isfinite(every.sum(axis=2)))
+    lengths = every[words, of]
+    arrived = _arrive(kinds[words], lengths, goals[of])
+    words, of, lengths = words[arrived], of[arrived], lengths[arrived]
     lengths = np.where(np.abs(lengths) <= 1e-7, 0.0, lengths)
+    cost = np.abs(lengths).sum(axis=1)
+    forward = np.zeros(len(cost))
+    for length in lengths.T:
+        way = np.where(np.abs(length) > 1e-6, np.sign(length), forward)
+        cost += change * ((forward != 0) & (way != forward))
+        forward = way
+    some = cost > 1e-7
+    words, of, lengths, cost = words[some], of[some], lengths[some], np.round(cost[some], 9)
     # Words with pieces of no length may be the same curve: it bends the same way everywhere.
     marks = np.cumsum(np.abs(lengths), axis=1) ** 2
     spans = np.diff(marks, axis=1, prepend=0.0)
@@ -217,17 +219,17 @@ def _curves(goals: Array, change: float, most: int, radius: float) -> Curves:
     return Curves(of[new], words[new], lengths[new] * radius)
 
 
-def _arrive(kinds: Array, lengths: Array, goals: Array) -> NDArray[np.bool_]:
-    """Which of the words, driven from the origin with radius 1, end in their goals."""
-    x, y, heading = np.zeros((3, *lengths.shape[:2]))
-    for piece in range(lengths.shape[2]):
-        side, length = kinds[:, piece, None], lengths[:, :, piece]
+def _arrive(sides: Array, lengths: Array, goals: Array) -> NDArray[np.bool_]:
+    """Which of N curves, driven from the origin with radius 1, end in their goals."""
+    x, y, heading, sin = np.zeros((4, len(lengths)))
+    cos = np.ones(len(lengths))
+    for side, length in zip(sides.T, lengths.T, strict=True):
         turned = heading + side * length
+        new_cos, new_sin = np.cos(turned), np.sin(turned)
         straight = side == 0
-        cos, sin = np.cos(heading), np.sin(heading)
-        x = x + np.where(straight, length * cos, side * (np.sin(turned) - sin))
-        y = y + np.where(straight, length * sin, side * (cos - np.cos(turned)))
-        heading = turned
+        x += np.where(straight, length * cos, side * (new_sin - sin))
+        y += np.where(straight, length * sin, side * (cos - new_cos))
+        heading, cos, sin = turned, new_cos, new_sin
     off = np.abs(_wrapped(heading - goals[:, 2]))
     return np.asarray(np.hypot(x - goals[:, 0], y - goals[:, 1]) + off < 1e-6)
 

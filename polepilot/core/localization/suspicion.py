@@ -99,8 +99,8 @@ class Suspicion:
             )
         if agreeing is not None and len(moved) >= max(_SEVERAL, agreeing - 1):
             return Suspected(
-                f"{len(moved)} landmarks are not in their places and only {agreeing} are: perhaps "
-                "this is not the map of this place.",
+                f"{len(moved)} landmarks are not in their places, and only {agreeing} were seen in "
+                "theirs since the pose was found: perhaps this is not the map of this place.",
                 max(math.hypot(*shift) for shift in moved.values()),
             )
         if self._map:

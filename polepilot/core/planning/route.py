@@ -15,7 +15,9 @@ from shapely import LineString, Polygon
 from polepilot.core.errors import PlanError
 from polepilot.core.geometry import Point, Pose2D
 from polepilot.core.plan import Plan, PlanPart
+from polepilot.core.planning.corners import with_few_corners
 from polepilot.core.planning.crumbs import without_crumbs
+from polepilot.core.planning.curves import CHANGE
 from polepilot.core.planning.driver import Driver
 from polepilot.core.planning.options import PlanOptions
 from polepilot.core.planning.score import predict
@@ -217,6 +219,43 @@ def _driven(
     From each node the wheel is turned until the robot looks at the next one, then straight on
     (paper, Tracking Route); with changes of gear where that is shorter or does not fit.
     """
+    few = [with_few_corners(way, space) for way in ways]
+    found: list[tuple[Driver, list[int]]] = []
+    for tried in (few, ways) if few != ways else (ways,):
+        try:
+            found.append(_tracked(wanted, tried, space, options))
+        except PlanError:
+            if tried is ways and not found:
+                raise
+    driver, ends = min(found, key=lambda way: _cost(way[0]))
+    path, gears, moved = without_jerks(*driver.track.arrays())
+    path, gears, there = without_crumbs(path, gears, space)
+    counts = [np.count_nonzero(np.diff(gears[: there[moved[end]]])) for end in ends]
+    for index, changes in enumerate(np.diff(counts).tolist()):
+        if changes:
+            times = "once" if changes == 1 else f"{changes} times"
+            notes.append(
+                f"On the way to node {index + 1} the robot changes its gear {times}: its turning "
+                f"radius of {in_words(options.min_turn_radius)} asks for it."
+            )
+    return path, gears
+
+
+def _cost(driver: Driver) -> float:
+    """How long a drive is, with what its changes of gear cost, metres."""
+    path, gears = driver.track.arrays()
+    length = float(np.hypot(*np.diff(path, axis=0).T).sum())
+    return length + CHANGE * np.count_nonzero(np.diff(gears))
+
+
+def _tracked(
+    wanted: _Wanted, ways: list[list[Point]], space: FreeSpace, options: PlanOptions
+) -> tuple[Driver, list[int]]:
+    """Drives along ways; also at which points of the track the nodes are.
+
+    Raises:
+        PlanError: one of the nodes cannot be driven to.
+    """
     driver = Driver(
         space, options.min_turn_radius, Pose2D(*space.start.position, _first_heading(ways, space))
     )
@@ -229,17 +268,7 @@ def _driven(
         if heading is not None and not driver.connect(way[-1], heading):
             raise _impossible(wanted, index, options)
         ends.append(driver.track.last)
-    path, gears, moved = without_jerks(*driver.track.arrays())
-    path, gears, there = without_crumbs(path, gears, space)
-    counts = [np.count_nonzero(np.diff(gears[: there[moved[end]]])) for end in ends]
-    for index, changes in enumerate(np.diff(counts).tolist()):
-        if changes:
-            times = "once" if changes == 1 else f"{changes} times"
-            notes.append(
-                f"On the way to node {index + 1} the robot changes its gear {times}: its turning "
-                f"radius of {in_words(options.min_turn_radius)} asks for it."
-            )
-    return path, gears
+    return driver, ends
 
 
 def _impossible(wanted: _Wanted, index: int, options: PlanOptions) -> PlanError:

@@ -17,8 +17,10 @@ Saved = tuple[int, int, Pose2D, float, int]
 
 PLAIN = math.radians(3.0)
 """A turn below this is left as it is where its legs are long enough."""
+_BESIDE = 1e-5
+"""What is so little beside the line of the heading is on it, metres."""
 _CHORD = 0.12
-"""What is longer than this is no chord of an arc, metres."""
+"""What is longer than this is no chord of an arc, unless that is wide, metres."""
 
 
 @dataclass(slots=True)
@@ -82,13 +84,19 @@ class Track:
     def straight_to(self, corner: Points) -> None:
         """Straight to a place on the line of the present heading, forward or back."""
         way = float(np.dot(corner - np.array(self.pose.position), self.ahead()))
+        if abs(way) < 1e-6:
+            return
         self.append((("S", way),))
+        if math.dist(self.pose.position, corner) < _BESIDE:  # no rounding adds up
+            self.points[-1][-1] = corner
+            self.pose = Pose2D(float(corner[0]), float(corner[1]), self.pose.heading)
 
     def back_out(self, distance: float) -> bool:
         """Drives back on its own track, in arcs to the next of its points; False: to its start."""
         points, gears = self.arrays()
         taken: list[Points] = [points[-1]]
         back: list[int] = []
+        chord = max(_CHORD, 1.05 * STEP * self.radius)
         rest = distance
         index = len(gears) - 1
         heading = self.pose.heading + (math.pi if self.sign < 0 else 0.0)
@@ -98,12 +106,16 @@ class Track:
             if step > 1e-9:
                 gear = -int(gears[index])
                 heading = _direction((b - a) * gear)
-                part = rest / step if step > _CHORD and rest < step else 1.0
-                if part == 1.0 and index > 0 and gears[index - 1] == gears[index]:
-                    # At a vertex of an arc the heading is between those of its two chords.
-                    beyond = _direction((points[index - 1] - b) * gear)
+                part = rest / step if step > chord and rest < step else 1.0
+                if part == 1.0 and index > 0 and step <= chord:
+                    # At a vertex of an arc the heading is between those of its two chords, or of a
+                    # chord and what is straight before it.
+                    before = b - points[index - 1]
+                    beyond = _direction(before * int(gears[index - 1]))
                     if abs(turn := angle_between(heading, beyond)) < PLAIN + STEP:
-                        heading = wrap_angle(heading + turn / 2)
+                        length = float(np.hypot(*before))
+                        share = 1.0 if length > chord else step / (step + length)
+                        heading = wrap_angle(heading + turn * share)
                 taken.append(a + (b - a) * part)
                 back.append(gear)
             rest -= step

@@ -35,6 +35,18 @@ def test_backing_out_of_an_arc_keeps_its_places_and_ends_where_it_began() -> Non
     assert len(gears) == track.last == len(points) - 1
 
 
+@pytest.mark.parametrize("radius", [0.6, 2.0])
+@pytest.mark.parametrize("distance", [0.1, 0.3, 0.55, 1.0, 1.2])
+def test_backing_out_of_an_arc_ends_along_the_arc(radius: float, distance: float) -> None:
+    track = Track(Pose2D(-1.0, 0.0, 0.0), radius)
+    track.append((("S", 1.0), ("L", 1.0)))
+    track.back_out(distance)
+    x, y, heading = track.pose
+    bend = 0.0 if x <= 1e-9 else math.atan2(x, radius - y)
+    assert heading == pytest.approx(bend, abs=math.radians(0.2))
+    assert y == pytest.approx(radius * (1 - math.cos(bend)), abs=0.002)
+
+
 def test_restoring_forgets_and_costs_count_changes_of_gear() -> None:
     track = Track(Pose2D(0.0, 0.0, 0.0), RADIUS)
     track.append((("S", 1.0),))

@@ -15,6 +15,7 @@ from shapely import MultiPolygon, Polygon
 from polepilot.core.errors import PlanError
 from polepilot.core.plan import Plan, PlanPart
 from polepilot.core.planning.bumps import long_for_bumps
+from polepilot.core.planning.curves import CHANGE
 from polepilot.core.planning.driven import driven_path
 from polepilot.core.planning.groups import regions_of
 from polepilot.core.planning.leftover import stretches_over
@@ -62,6 +63,8 @@ _SOON = (2000, 600)
 """With more corners than the first no other spacing is tried, up to the second all of them."""
 _FEW = 250
 """Up to so many corners other starts are tried as well, where the site has none."""
+_FEW_SQUARES = 250.0
+"""On maps of fewer squares of the tool a wheel's path is worked out for every spacing."""
 _TOUCH = 0.004
 """How much loops overlap where bumps sweep what is left between them."""
 _AT_WALLS = 0.005
@@ -205,20 +208,24 @@ def _shortest(
     free_start = space.anywhere
     while trials:
         here, spacing = trials.pop(0)
-        strokes = _strokes(pieces, here, options, target, whole, spacing)
-        if not strokes:
-            strokes = [_least_stroke(here)]
-        report(0.3, "order")
-        runs = ordered_runs(
-            strokes,
-            here.start.position,
-            here,
-            options.order,
-            reach=options.tool_width,
-            gap=0.0 if options.min_turn_radius > 0 else _GAP * options.tool_width,
-        )
-        report(0.5, "path")
-        found = _path(runs, here, options, target, notes if best is None else [], whole)
+        ways = _strokes(pieces, here, options, target, whole, spacing)
+        few = not plain and target.area < _FEW_SQUARES * target.tool**2
+        tried = []
+        for strokes in (ways if few else ways[:1]) or [[_least_stroke(here)]]:
+            report(0.3, "order")
+            runs = ordered_runs(
+                strokes,
+                here.start.position,
+                here,
+                options.order,
+                reach=options.tool_width,
+                gap=0.0 if options.min_turn_radius > 0 else _GAP * options.tool_width,
+            )
+            report(0.5, "path")
+            said: list[str] = []
+            tried.append((_path(runs, here, options, target, said, whole), said))
+        found, said = min(tried, key=lambda way: _driven_cost(way[0], target))
+        notes += said if best is None else []
         corners = len(few_corners(found[0]))
         large = corners > _SOON[0] or target.area > _LARGE * target.tool**2
         if not plain or not whole or options.order == "paper" or large:
@@ -234,6 +241,12 @@ def _shortest(
             free_start = False
     assert best is not None  # there is at least one spacing
     return best
+
+
+def _driven_cost(planned: Planned, target: Target) -> float:
+    """What a path costs with its changes of gear and what it misses, metres."""
+    path, gears, _, missed = planned
+    return path_cost(path, missed or 0.0, target.tool) + CHANGE * np.count_nonzero(np.diff(gears))
 
 
 def _least_stroke(space: FreeSpace) -> Stroke:
@@ -264,8 +277,9 @@ def _strokes(
     target: Target,
     whole: bool,
     spacings: tuple[float, ...],
-) -> list[Stroke]:
-    """Loops and clean-up passes for ``target``; for patches passes, and stretches of loops."""
+) -> list[list[Stroke]]:
+    """Loops and clean-up passes for ``target``, for some spacings, the best first; for patches
+    passes, and stretches of loops."""
     tool = options.tool_width
     smallest = _SMALLEST * (tool / 0.4) ** 2
     plain = options.min_turn_radius <= 0
@@ -281,8 +295,8 @@ def _strokes(
         ways = [stretches_over(nest.loops, target.shape, tool) for nest in every]
         loops = min(ways, key=lambda strokes: _cost(strokes, extra))
         missed = target.missed(*(stroke.track for stroke in loops))
-        return _completed(loops, missed, space, target, smallest, _always if plain else _long)
-    best: list[Stroke] = []
+        return [_completed(loops, missed, space, target, smallest, _always if plain else _long)]
+    found: list[tuple[float, list[Stroke]]] = []
     least = math.inf
     for closer in spacings:
         nest = nested_loops(pieces, tool, tolerance, closer, overlap)
@@ -295,14 +309,14 @@ def _strokes(
             nest = nested_loops(pieces, tool, tolerance, _CLOSER_THEN, _TOUCH)
             missed = nest.missed(target.shape, tool, target.quad_segs)
         strokes = _completed(nest.loops, missed, space, target, smallest, passed)
-        cost = _cost(strokes, extra)
-        if strokes and cost < least:
-            best, least = strokes, cost
+        if strokes:
+            found.append((_cost(strokes, extra), strokes))
+            least = min(least, found[-1][0])
         if many or target.area > _LARGE * tool**2:
             break  # on a large map the spacing matters less than the time to think about it
         if len(nest.loops) > (_MANY if plain else _MANY_FOR_WHEELS):
             break
-    return best
+    return [strokes for _, strokes in sorted(found, key=lambda way: way[0])]
 
 
 def _cost(strokes: list[Stroke], extra: float) -> float:

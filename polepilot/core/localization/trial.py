@@ -53,6 +53,8 @@ class Trial:
     """When poses have been given up for that since one was confirmed."""
     pivots: set[int] = field(default_factory=set)
     """Round which of the two the pose may still be turned."""
+    _third: dict[int, set[int]] = field(default_factory=dict)
+    """Which others rule that out, by pivot."""
 
     @property
     def over(self) -> bool:
@@ -93,6 +95,7 @@ class Trial:
         """``used``: the sightings that led to the pose."""
         self.fixed_by = frozenset(fixed_by)
         self.pivots = set() if self.over else set(fixed_by)
+        self._third.clear()
         if self.over:
             self.failures.clear()
         self.against.clear()
@@ -125,7 +128,10 @@ class Trial:
         for number in tuple(self.pivots):
             aside = self._turn * math.dist(third, self.landmarks[number].position)
             if aside > _TELLING * self.shift:
-                self.pivots.discard(number)
+                agreeing = self._third.setdefault(number, set())
+                agreeing.add(measurement.landmark)
+                if len(agreeing) >= self._needed:
+                    self.pivots.discard(number)
         if not self.pivots:
             self.begin(())
 
@@ -144,6 +150,12 @@ class Trial:
             f"Landmarks {' and '.join(map(str, firm))} contradict the pose that {one} and {other} "
             f"have given: one of those has been moved{_OR_ELSE if self.failures else ''}."
         )
+
+    @property
+    def _needed(self) -> int:
+        """So many third landmarks have to agree: more than contradict, if there are so many."""
+        against = len(self._firm())
+        return max(1, min(against + 1, len(self.landmarks) - 2 - against))
 
     def _firm(self) -> list[int]:
         """Who has contradicted the pose twice.

@@ -96,6 +96,25 @@ def test_a_third_beside_the_pivot_rules_out_one_supposition_alone() -> None:
     assert trial.over
 
 
+def test_one_that_agrees_and_one_that_contradicts_leave_it_undecided() -> None:
+    marks = {**MARKS, 5: Landmark(5, -3.0, 4.0)}
+    trial = Trial(marks, 0.2, 0.05)
+    trial.begin((1, 2))
+    for _ in range(2):
+        assert trial.contradicts(seen(3)) == ""
+    for _ in range(9):
+        trial.agrees(seen(4))
+        assert trial.pivots == {1, 2}
+    assert "Landmark 3 contradicts" in trial.doubt
+    assert trial.undecided
+    trial.agrees(seen(5))
+    assert trial.over
+    # What one of them said of the pose before says nothing of this one.
+    trial.begin((1, 2))
+    trial.agrees(seen(5))
+    assert trial.over
+
+
 def test_the_two_are_no_witnesses_against_themselves() -> None:
     trial = Trial(MARKS, 0.2, 0.05)
     trial.begin((1, 2))

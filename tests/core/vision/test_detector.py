@@ -229,7 +229,7 @@ def inside(n: int, first: float, end: float) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("tone", [12, 30, 55])
 @pytest.mark.parametrize("away", [5.0, 8.5, 10.0, 12.0, 14.0])
-def test_a_board_across_a_landmark_is_noticed_at_any_distance(away: float, tone: int) -> None:
+def test_a_board_across_a_landmark_is_noticed_near_and_far(away: float, tone: int) -> None:
     for seed, number in enumerate((3, 7, 11, 13, 14, 15)):
         image = picture([pole(number, away, 0.0)], seed)
         one = only(image)

@@ -12,25 +12,26 @@
 #include <string.h>
 
 #define ENOUGH 1.85     /* evidence; a piece is hardly ever more than 1 without a cover, */
-#define MOST_OF_ONE 1.5 /* and counts no more than this */
+#define MOST_OF_ONE 1.5 /* and counts no more than this; but for the one that is */
+#define CERTAIN 2.85    /* by itself, whatever else there is */
 #define LEAST_ROWS 3.5  /* of a cover with fewer only what is certain counts */
 #define MIDST_WIDE 0.5  /* half of the midst of a bit: of the strip's, */
 #define MIDST_HIGH 0.25 /* segments; blur leaves it alone */
-#define MOST_SEEN 8     /* rows and columns of it that are kept, at the least */
+#define MOST_SEEN 8     /* rows and columns of it that are looked at, at the most */
 #define MOST_ROWS 512   /* of what is beside a side, */
 #define ROWS_A_UNIT 5.0 /* and how many a segment if there are many more */
 #define REACH 0.8       /* segments that it goes on above and below the code */
 #define TILTS 8         /* slopes of what lies aslant, to either side, */
 #define TILT 0.2        /* by so many more segments up or down each */
 #define LEVEL_TILTS 1   /* of them what is seen at one side only may have */
-#define SAME_BOTH 0.015 /* of bright - dark: how much one thing differs on the pole and beside, */
-#define SAME_SHARE 0.06  /* or of how much it stands out, if that is more, */
+#define SAME_BOTH 0.015 /* of bright - dark: how much one thing may differ on the pole and beside; or */
+#define SAME_SHARE 0.06 /* of how much it stands out, as far as that is no more than bright - dark */
 #define SAME_ONE 0.02
 #define SAME_NOISE 0.2  /* times the fit's rest, more; */
 #define UNLIKE 5.0      /* times as much of SAME_ONE says nothing any more */
-#define STANDS_OUT_LEAST 0.08 /* from what is above and below, of bright - dark; at both sides, */
-#define STANDS_OUT 0.2   /* or with SAME_BOTH, */
-#define STANDS_OUT_ONE 0.5 /* or at one so that nothing is missing */
+#define STANDS_OUT 0.2  /* from what is above and below, of bright - dark: what SAME_BOTH takes; */
+#define STANDS_OUT_LEAST 0.08 /* what stands out by less than that, but by so much, takes SAME_SHARE */
+#define STANDS_OUT_ONE 0.5 /* and at one side so that nothing is missing */
 #define OTHER_BLACK 0.04   /* of bright - dark, and times the spread of the other dark segments: */
 #define OTHER_SPREAD 3.0
 #define OTHER_PAINT 0.25   /* of bright - dark; gloss and shade differ by less */
@@ -70,7 +71,7 @@ typedef struct {
     int shows[2];                                    /* if it is to be seen */
 } scene;
 
-/* Bits next to each other that one thing may lie over. */
+/* Bits next to each other that one thing may lie over: one, or several dark ones. */
 typedef struct {
     int first, last; /* segments */
     int top, bottom; /* the run of dark segments that they are in, and the first segment below it */
@@ -171,6 +172,13 @@ static int look_beside(const scene *s, int way, const block *over, double shift,
     return 1;
 }
 
+/* Whether it is the same thing that differs so much on the pole and beside, and stands out so much. */
+static int is_same(double unlike, double out, double both)
+{
+    double share = SAME_SHARE * fmin(out, 1);
+    return out > 3 * both && unlike < (out < STANDS_OUT ? share : fmax(both, share));
+}
+
 /* Whether what is there goes on at both sides of the pole, and ends: evidence. */
 static double goes_on(const scene *s, const block *over)
 {
@@ -183,15 +191,14 @@ static double goes_on(const scene *s, const block *over)
             if (!look_beside(s, way, over, TILT * k, UNLIKE * one, &unlike, &out) ||
                 out < STANDS_OUT_LEAST)
                 continue;
-            same[way][k + TILTS] =
-                unlike < fmax(out < STANDS_OUT ? 0 : both, SAME_SHARE * out) && out > 3 * both;
+            same[way][k + TILTS] = is_same(unlike, out, both);
             if (abs(k) <= LEVEL_TILTS)
                 most = fmax(most, fmin(out / STANDS_OUT_ONE, 1) * one / fmax(unlike, one / 2));
         }
     /* A straight thing lies as much higher on one side as it lies lower on the other. */
     for (int k = 0; k <= 2 * TILTS; k++)
         if (same[0][k] && same[1][2 * TILTS - k])
-            return ENOUGH + 1;
+            return CERTAIN;
     return at_most(most);
 }
 
@@ -256,11 +263,11 @@ static double swells(const scene *s, const block *over)
     for (int way = 0; way < 2; way++) {
         const double *width = s->width[way];
         double elsewhere = 0, usual = s->straight[way];
+        if (!s->shows[way] || isnan(width[over->first]) || isnan(width[over->last]))
+            continue;
         double here = INFINITY;
         for (int k = over->first; k <= over->last; k += 2)
             here = fmin(here, width[k]);
-        if (!s->shows[way] || isnan(width[over->first]) || isnan(width[over->last]))
-            continue;
         for (int k = 0; k < s->segments; k++)
             if ((k < over->top || k >= over->bottom) && !isnan(width[k]))
                 elsewhere = fmax(elsewhere, fabs(width[k] - usual));
@@ -340,14 +347,16 @@ static void see(const eye_picture *p, const eye_upright *u, const eye_side *side
         light[c] /= n;
 }
 
+/* The block from bit to bit. The light of several is that of what lies between them: bright segments
+ * above and below lighten the ends. */
 static block block_of(const scene *s, const eye_picture *p, const eye_upright *u, const eye_side *side,
                       int first, int last)
 {
     block over = {.first = first, .last = last, .top = first, .bottom = last + 1};
-    int inner = last > first; /* its edges are lightened by what is above and below */
-    for (int i = first + inner; i <= last - inner; i++)
+    int from = last > first ? first + 1 : first, to = last > first ? last - 1 : last;
+    for (int i = from; i <= to; i++)
         for (int c = 0; c < s->channels; c++)
-            over.level[c] += s->levels[i][c] / (last - first + 1 - 2 * inner);
+            over.level[c] += s->levels[i][c] / (to - from + 1);
     while (s->code[first] == '0' && s->code[over.top - 1] == '0')
         over.top--;
     while (s->code[last] == '0' && s->code[over.bottom] == '0')
@@ -357,40 +366,24 @@ static block block_of(const scene *s, const eye_picture *p, const eye_upright *u
     return over;
 }
 
-/* All that speaks for something in front of these bits. */
+/* All that speaks for something in front of these bits; over few rows only what is certain. */
 static double evidence_of(const scene *s, const eye_upright *u, const block *over)
 {
-    double evidence;
-    if (s->code[over->first] == '1') {
-        evidence = other_paint(s, over->first);
-        if (evidence < LIKE_PAINT)
-            return 0;
-        evidence += goes_on(s, over);
-    } else {
-        evidence = goes_on(s, over) + other_black(s, over);
-        if (s->has_rows)
-            evidence += step(s, u, over->top, over->bottom);
-    }
+    int bright = s->code[over->first] == '1';
+    double rows = s->scale->unit * ((over->last - over->first) / 2.0 + 1);
+    double paint = bright ? other_paint(s, over->first) : 0;
+    if (bright && paint < LIKE_PAINT)
+        return 0;
+    double evidence = goes_on(s, over);
+    if (evidence > ENOUGH || rows < LEAST_ROWS)
+        return evidence;
+    evidence += bright ? paint : other_black(s, over);
+    if (!bright && s->has_rows)
+        evidence += step(s, u, over->top, over->bottom);
     return s->coloured && evidence <= ENOUGH ? evidence + swells(s, over) : evidence;
 }
 
-/* Whether something stands in front of these bits and of what is between them. */
-static int is_over(const scene *s, const eye_picture *p, const eye_upright *u, const eye_side *side,
-                   int first, int last)
-{
-    block over = block_of(s, p, u, side, first, last);
-    double rows = s->scale->unit * ((last - first) / 2.0 + 1); /* with half of what is between bits */
-    if ((rows < LEAST_ROWS ? goes_on(s, &over) : evidence_of(s, u, &over)) > ENOUGH)
-        return 1;
-    if (last == first)
-        return 0;
-    /* What is seen for certain over one of them is enough. */
-    block upper = block_of(s, p, u, side, first, first);
-    block lower = block_of(s, p, u, side, last, last);
-    return goes_on(s, &upper) > ENOUGH || goes_on(s, &lower) > ENOUGH;
-}
-
-/* Whether something stands in front of a bit, which makes one landmark of another. */
+/* Whether something stands in front of bits, which makes one landmark of another. */
 int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *u,
                  const eye_scale *scale, const eye_side *side, const char *code,
                  double levels[][EYE_LIGHTS], int segments)
@@ -416,7 +409,7 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
     }
     if (s.contrast <= 0)
         return 0;
-    int filled = 0;
+    int filled = 0, certain[EYE_MOST_SEGMENTS]; /* whether something is over a bit for certain */
     for (int i = 3; i < segments - 3; i += 2)
         for (int last = i; last < segments - 3; last += 2) {
             if (last > i && (code[i] == '1' || code[last] == '1'))
@@ -430,9 +423,14 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
                 s.coloured = eye_is_coloured(p->channels, task);
                 if (s.coloured)
                     know_sides(&s, task);
+                for (int k = 3; k < segments - 3; k += 2) {
+                    block one = block_of(&s, p, u, side, k, k);
+                    certain[k] = code[k] == '0' && goes_on(&s, &one) >= CERTAIN;
+                }
                 filled = 1;
             }
-            if (is_over(&s, p, u, side, i, last))
+            block over = block_of(&s, p, u, side, i, last);
+            if (certain[i] || certain[last] || evidence_of(&s, u, &over) > ENOUGH)
                 return 1;
         }
     return 0;

@@ -6,6 +6,7 @@ import numpy as np
 import shapely
 import shapely.ops
 from shapely import LineString, MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from polepilot.core.geometry import Polyline
 from polepilot.core.plan import Unreachable
@@ -59,12 +60,17 @@ def unreachable_pieces(space: FreeSpace, reachable: MultiPolygon) -> tuple[Unrea
 
 def _grown(part: Polygon, space: FreeSpace, reachable: MultiPolygon) -> Polygon:
     """A part with what was taken of it against slivers, but nothing of what is reachable."""
-    grown = part.buffer(_SLIVER, join_style="mitre")
+    grown = _valid(part.buffer(_SLIVER, join_style="mitre"))
     floor, taken = (
-        shapely.clip_by_rect(shape, *grown.bounds) for shape in (space.floor, reachable)
+        _valid(shapely.clip_by_rect(shape, *grown.bounds)) for shape in (space.floor, reachable)
     )
     left = polygons(grown.intersection(floor).difference(taken))
     return max(left or [part], key=lambda p: float(p.area))
+
+
+def _valid(shape: BaseGeometry) -> BaseGeometry:
+    """Areas whose rings do not cross: mitred corners may, and so may what is clipped by a box."""
+    return shapely.make_valid(shape, method="structure", keep_collapsed=False)
 
 
 class _Passages:

@@ -312,7 +312,7 @@ class _Bumped:
         whole: list[int] = []
         kept: list[Points] = []
         for index in self._few_tree.query(shapely.box(*low, *high)).tolist():
-            begin, end = float(self._few_marks[index]), float(self._few_marks[index + 1])
+            begin, end = self._within(index, low, high)
             at = bisect_right(self._ends, begin)
             if not (begin < last and first < end) and not (
                 at < len(self._begins) and self._begins[at] < end
@@ -335,6 +335,20 @@ class _Bumped:
             if x0 < high[0] and x1 > low[0] and y0 < high[1] and y1 > low[1]:
                 kept.append(bump.legs)
         return np.vstack([self._few_legs[whole], *kept])
+
+    def _within(self, index: int, low: Points, high: Points) -> tuple[float, float]:
+        """Between which lengths along the path a leg with few corners is in a box. A long one has
+        bumps all along, and only those in the box matter there."""
+        first, last = float(self._few_marks[index]), float(self._few_marks[index + 1])
+        shares = [0.0, 1.0]
+        for a, b, least, most in zip(
+            *self._few[index : index + 2].tolist(), low.tolist(), high.tolist(), strict=True
+        ):
+            if a != b:
+                begin, end = sorted(((least - a) / (b - a), (most - a) / (b - a)))
+                shares = [max(shares[0], begin), min(shares[1], end)]
+        begin, end = (first + share * (last - first) for share in shares)
+        return begin, max(begin, end)
 
     def _part(self, index: int, begin: float, end: float) -> Points:
         """1 x 4: a part of a leg with few corners, between lengths along the path."""

@@ -52,6 +52,32 @@ def test_a_strip_beside_a_leg_is_swept_by_stretches_that_step_aside() -> None:
     assert _length(points) - 3.0 < 0.85 * 2.4
 
 
+def test_a_leg_twice_as_long_is_twice_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What bumps do elsewhere on a long leg is nobody's business here."""
+    taken = 0
+    part = bumps._Bumped._part
+
+    def counted(self: bumps._Bumped, index: int, begin: float, end: float) -> bumps.Points:
+        nonlocal taken
+        taken += 1
+        return part(self, index, begin, end)
+
+    monkeypatch.setattr(bumps._Bumped, "_part", counted)
+    work = []
+    for length in (20.0, 40.0):
+        taken = 0
+        space = free_space(maps.site(maps.box(-2, -2, length + 2, 2)), PlanOptions())
+        target = Target(MultiPolygon([shapely.box(0.3, -0.1, length - 0.3, 0.3)]), TOOL)
+        path = np.array([[0.0, 0.0], [0.05, 0.0], [length, 0.0]])
+        parts = (PlanPart("loop", 0, 2),)
+        points, _, missed = with_bumps(path, parts, target, space, 0.0005)
+        assert missed < 0.08 * 0.1 * length
+        assert len(points) > 2 * length
+        work.append(taken)
+    assert work[0] > 50
+    assert work[1] < 2.3 * work[0]
+
+
 def test_nothing_missed_nothing_changed() -> None:
     path = [[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]]
     points, before, after = _bumped(path, shapely.box(0.5, -0.1, 2.5, 0.1))

@@ -149,6 +149,26 @@ void eye_match_comb(eye_hits *hits, const uint8_t *signal, int first, int last, 
     }
 }
 
+/* Of a column and those beside it the one with most colour between two rows: only every second one was
+ * asked, and a mosaic may leave a thin strip's colour in a single column. */
+static int most_coloured(const eye_hits *hits, int x, int top, int bottom)
+{
+    const eye_picture *p = hits->picture;
+    int most = -1, best = x;
+    for (int k = eye_clamp(x - 1, 0, p->columns - 1); k <= x + 1 && k < p->columns; k++) {
+        int sum = 0;
+        for (int y = top; y < bottom; y += ROWS_APART) {
+            int colour = eye_colour(p->pixels + y * p->stride + (ptrdiff_t)p->channels * k, hits->task);
+            sum += colour > 0 ? colour : 0;
+        }
+        if (sum > most) {
+            most = sum;
+            best = k;
+        }
+    }
+    return best;
+}
+
 /* Codes in column ``x`` that have hardly any colour left, somewhere: by their brightness. That takes
  * long, so it ends when a picture speckled with colour has used up what a landmark may cost. */
 void eye_match_faint(eye_hits *hits, int x)
@@ -170,7 +190,7 @@ void eye_match_faint(eye_hits *hits, int x)
         int room = LONGEST - height + BESIDE;
         int top = from < room ? 0 : from - room;
         int bottom = end + room + 1 < p->rows ? end + room + 1 : p->rows;
-        sum_brightness(hits, x, top, bottom, sum);
+        sum_brightness(hits, most_coloured(hits, x, top, bottom), top, bottom, sum);
         if (has_valleys(sum, bottom - top)) {
             hits->slides -= hits->n_bits;
             match_stretch(hits, sum, top, bottom, from, end, LONGEST, x);

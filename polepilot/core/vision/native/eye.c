@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #define LEAST_ROWS 8           /* of a picture; no code has fewer */
 #define ATTEMPTS 2             /* the second one with the code that the first has read */
@@ -24,6 +25,10 @@
 #define MOST_APART 2.0          /* up to this much */
 #define SURE 6e-4              /* share of the unit: no second fit makes it better */
 #define SHARP 5.0              /* rows per segment: blurred colour still parts them */
+#define FEW_ROWS 3.0           /* per segment: codes are weighed as a whole, */
+#define BLURRED 2.4            /* and even pixels blur segments */
+#define MOST_WEIGHS 4          /* in one picture: it takes as long as all else of a candidate */
+#define UNREAD (-1.0)          /* instead of a tint: not every segment reads by itself */
 #define NEAR 7.5               /* rows per segment: from here on strips fit well, */
 #define FAR 4.5                /* from here down they need not; */
 #define EVEN_NEAR 4.0          /* the same for evenly striped ones */
@@ -109,9 +114,14 @@ static int read_strip(const eye_task *task, const eye_candidate *candidate,
     double noise = scale->noise / sqrt(scale->unit > 1 ? scale->unit : 1);
     reason = eye_read(task, levels, segments, upright->channels, sharp, noise, out->width,
                       candidate->open_top || candidate->open_bottom, out->code, &out->tint);
+    int seen = reason == EYE_READ ? eye_decode(out->code, segments) : 0;
+    if (candidate->settled && seen != wanted) { /* its segments say too little one by one */
+        memcpy(out->code, code, sizeof out->code);
+        out->tint = UNREAD;
+        return EYE_READ;
+    }
     if (reason != EYE_READ)
         return reason;
-    int seen = eye_decode(out->code, segments);
     if (seen == 0)
         return EYE_NO_CODE;
     *id = seen;
@@ -223,25 +233,54 @@ static int examine(const eye_picture *picture, const eye_task *task,
         off += apart * apart / (USUAL_APART * USUAL_APART);
     else
         most += MISFIT_APART * fmin(apart, MOST_APART);
-    if (!(off <= most)) /* or no number */
+    /* Half of the squares are the logarithm by which normal errors make a strip less likely. */
+    if (candidate->settled && apart >= 0 && off / 2 <= candidate->odds) {
+        out->tint = fmax(out->tint, 0);
+        return EYE_READ;
+    }
+    if (!(off <= most) || out->tint == UNREAD) /* or no number */
         return EYE_POOR_FIT;
     doubt /= USUAL_DOUBT;
     return off + doubt * doubt > most ? EYE_NO_BAR : EYE_READ;
 }
 
-/* Examines a candidate by its colour and, if that is of no use on a far one whose colour is blurred, by
- * its brightness: JPEG and cheap sensors blur colour over as many rows as a segment has. */
+/* Whether a candidate that failed in colour gets a second chance: a far one whose colour is blurred, or one
+ * so far that pixels blur it, of which at least something was to be seen. */
+static int may_be_read(const eye_picture *picture, const eye_task *task,
+                       const eye_candidate *candidate, const eye_strip *strip, double unit)
+{
+    switch (strip->reason) {
+    case EYE_READ:
+    case EYE_COVERED:
+    case EYE_NO_BAR:
+    case EYE_GOES_ON:
+        return 0;
+    case EYE_NO_CONTRAST:
+    case EYE_NO_SCALE:
+        return unit < SHARP && eye_has_blurred_colour(picture, task, candidate);
+    default: /* brightness alone is no second witness */
+        return (unit < BLURRED && eye_is_coloured(picture->channels, task)) ||
+               (unit < SHARP && eye_has_blurred_colour(picture, task, candidate));
+    }
+}
+
+/* Examines a candidate by its colour and, if that is of no use on a far one, by its brightness: JPEG and
+ * cheap sensors blur colour over as many rows as a segment has. Where that is a few rows, where the
+ * likeliest code is; ``weighs``: how many more times that may be asked. */
 static eye_strip look_closely(const eye_picture *picture, const eye_task *task,
-                              const eye_candidate *candidate)
+                              const eye_candidate *candidate, int *weighs)
 {
     eye_strip strip = {0}, other = {0};
+    eye_candidate likeliest = *candidate;
     double unit = (candidate->bottom - candidate->top) / (2 * candidate->bits + 1);
     strip.reason = examine(picture, task, candidate, 0, &strip);
-    int sure = strip.reason == EYE_READ || strip.reason == EYE_COVERED ||
-               strip.reason == EYE_NO_BAR || strip.reason == EYE_GOES_ON;
-    if (sure || unit >= SHARP || !eye_has_blurred_colour(picture, task, candidate))
+    if (!may_be_read(picture, task, candidate, &strip, unit))
         return strip;
-    other.reason = examine(picture, task, candidate, 1, &other);
+    if (unit < FEW_ROWS &&
+        ((*weighs)-- <= 0 ||
+         !eye_weigh_codes(picture, task, thickest(task, candidate->bits), &likeliest)))
+        return strip;
+    other.reason = examine(picture, task, &likeliest, 1, &other);
     return other.reason == EYE_READ ? other : strip;
 }
 
@@ -261,13 +300,13 @@ static int look(const eye_picture *picture, const eye_task *task, eye_strip *str
     int n = eye_search(picture, task, candidates);
     if (n < 0)
         return -1;
-    int looked = 0;
+    int looked = 0, weighs = MOST_WEIGHS;
     for (int i = 0; i < n && looked < capacity; i++) {
         int known = 0;
         for (int k = 0; k < looked && !known; k++)
             known = is_within(candidates + i, strips + k);
         if (!known)
-            strips[looked++] = look_closely(picture, task, candidates + i);
+            strips[looked++] = look_closely(picture, task, candidates + i, &weighs);
     }
     return looked;
 }

@@ -10,6 +10,7 @@
  *     slide.c    codes laid along the light of a column
  *     chroma.c   whether colour is blurred there
  *     gather.c   columns that agree
+ *   odds.c     the likeliest of all codes, where segments one by one say too little
  *   upright.c  how the strip leans; its light by row, straightened, and by column
  *   scale.c    all edges of the code at once, fitted to one scale, by the model in wave.c
  *   read.c     the light of the segments as bits, or why they are none

@@ -20,6 +20,9 @@ typedef struct {
     double top, bottom;        /* the inner borders of the end bars: after segment 2, before N - 2 */
     int evidence;              /* contrast, summed up over the columns that agreed */
     int open_top, open_bottom; /* the end bar's end is not to be seen */
+    int settled;               /* it is where, and the code that, is the likeliest of all, */
+    double lean;               /* which leans so much, */
+    double odds;               /* and so much likelier than is enough, as a logarithm */
 } eye_candidate;
 
 /* A straightened strip. */
@@ -68,6 +71,8 @@ int eye_straighten(const eye_picture *picture, const eye_task *task,
 /* Whether the colour of what a candidate covers is blurred along it, and its brightness is not. */
 int eye_has_blurred_colour(const eye_picture *picture, const eye_task *task,
                            const eye_candidate *candidate);
+int eye_weigh_codes(const eye_picture *picture, const eye_task *task, double aspect,
+                    eye_candidate *candidate);
 /* ``sharp``, here and below: by brightness instead of the paint's colour. */
 int eye_fit_scale(const eye_upright *upright, const eye_task *task, const char *code,
                   const eye_candidate *candidate, int sharp, eye_scale *out);

@@ -6,8 +6,8 @@
 #include <math.h>
 #include <string.h>
 
-#define ROUGH_REST 0.18f /* mean square that a code may leave over at whole rows, of bright - dark, */
-#define MOST_REST 0.12f  /* and at quarters of a row */
+#define ROUGH_REST 0.24f /* mean square that a code may leave over at whole rows, of bright - dark, */
+#define MOST_REST 0.2f  /* and at quarters of a row */
 #define LONE 0.75f       /* share of the light that a single bright segment keeps */
 #define LEAST_RISE 5.0f  /* grey levels from a fence to the end bar beside it */
 #define COARSE 0.33f     /* of a segment, or a row: by so much differ the lengths that are tried first */

@@ -12,6 +12,8 @@
 #define MARGIN 1.3      /* segments above and below the code that are kept */
 #define UNSURE 3.0      /* rows per segment below which a steeper one is taken for upright, */
 #define UPRIGHT 0.95    /* if it stands out so much then, of how it does with its lean */
+#define SETTLED_LEAN 0.05 /* columns per row, and columns, by which a likeliest code may be off: */
+#define SETTLED_COLUMN 1.0
 #define STEEPEST 0.118  /* columns per row: 60 degrees/s, a slow shutter and 2 degrees of roll */
 #define MOST_LEANS 12   /* that are tried to either side at first */
 #define ROUNDS 2        /* of parabolas after that */
@@ -379,8 +381,10 @@ int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candida
     if (fabs(lean) > STEEPEST) {
         if (!sharp && (unit > UNSURE || stands < UPRIGHT))
             return EYE_LEANS;
-        lean = 0; /* what stands beside a far one pulls at it, and so does noise */
+        lean = c->lean; /* what stands beside a far one pulls at it, and so does noise */
     }
+    if (c->settled && fabs(lean - c->lean) > SETTLED_LEAN)
+        lean = c->lean;
     difference(bands, n, columns, step, row, lean, 0, sharp, out->across);
     for (int i = 0; i < columns; i++)
         if (first + i * step < 0 || first + (i + 1) * step > p->columns)
@@ -390,7 +394,10 @@ int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candida
     out->columns = columns;
     out->step = step;
     out->across_first = across_first;
-    if (!find_middle(out, wide, &out->column))
+    int found = find_middle(out, wide, &out->column);
+    if (c->settled && (!found || fabs(out->column - c->column) > SETTLED_COLUMN))
+        out->column = c->column;
+    else if (!found)
         return EYE_NO_CONTRAST;
     difference(bands, n, columns, step, row, lean, 1, sharp, out->across);
     out->half_window = fmax(LOOKED_AT * wide / 2, LEAST_LOOKED_AT);

@@ -31,7 +31,7 @@ THIN = ((1, 10_000), (10_000, 1), (1, 1), (7, 400), (8, 1), (8, 8), (10_000, 2),
 """Rows and columns of pictures that are none."""
 MEASURES = (
     *("reason", "id", "bits", "sides", "column", "row", "unit", "sag", "lean", "width", "front"),
-    *("blur", "noise", "side_noise", "tint", "unit_sigma", "sag_sigma", "column_sigma"),
+    *("aside", "blur", "noise", "side_noise", "tint", "unit_sigma", "sag_sigma", "column_sigma"),
 )
 
 

@@ -18,7 +18,7 @@ from polepilot.core.landmark import LandmarkKind
 from polepilot.core.observation import Image
 from polepilot.core.vision.paint import ORANGE, Paint
 
-VERSION = 3
+VERSION = 4
 IDS = 256
 MOST_STRIPS = 32
 _LIBRARY = Path(__file__).with_name("_kernel.so")
@@ -99,6 +99,8 @@ class Strip(ctypes.Structure):
     width: float
     front: float
     """Mean height of the surface that was measured, as a share of the radius."""
+    aside: float
+    """How far to the right of its middle that was, likewise: the picture may cut off a side."""
     blur: float
     noise: float
     """What the fit of the edges leaves over, as a share of bright minus dark."""
@@ -124,6 +126,7 @@ class Strip(ctypes.Structure):
         ("lean", ctypes.c_double),
         ("width", ctypes.c_double),
         ("front", ctypes.c_double),
+        ("aside", ctypes.c_double),
         ("blur", ctypes.c_double),
         ("noise", ctypes.c_double),
         ("side_noise", ctypes.c_double),

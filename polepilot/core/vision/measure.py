@@ -33,9 +33,6 @@ LEVEL = math.radians(2.5)
 """A camera looks up or down by no more than this."""
 HIGHEST = 2.0
 """Metres above the floor at which a landmark's middle may be, and half of its height more."""
-RANGE_FLOOR = 0.0004
-"""Share of the range that is uncertain besides what the fit knows: blur that is not Gaussian,
-grey levels that are not quite sRGB, roll."""
 UNIT_FACTOR = 1.15
 """By how much the scale is less certain than a fit with independent noise says."""
 COLUMN_FACTOR = 1.5
@@ -66,7 +63,12 @@ def column_of(bearing: float, camera: Camera) -> float:
 
 
 def range_of(
-    unit: float, bearing: float, kind: LandmarkKind, camera: Camera, front: float = 1.0
+    unit: float,
+    bearing: float,
+    kind: LandmarkKind,
+    camera: Camera,
+    front: float = 1.0,
+    aside: float = 0.0,
 ) -> float:
     """Horizontal distance from a level camera's vertical axis to the landmark's axis, metres.
 
@@ -75,9 +77,12 @@ def range_of(
         bearing: of the landmark from the optical axis, radians.
         front: how far the surface that was measured stands out from the axis, as a share of
             ``kind.axis_depth``: 1 for the middle column of a cylinder, less towards its sides.
+        aside: how far to the right of the axis that surface is, as a share of half its diameter:
+            away from the picture's middle that is nearer along the optical axis, or farther.
     """
     depth = depth_of(kind.segment, unit, camera.constant)
-    return depth / math.cos(bearing) + front * kind.axis_depth
+    shift = aside * math.tan(bearing) * kind.diameter / 2
+    return depth / math.cos(bearing) + front * kind.axis_depth - shift
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,6 +179,21 @@ def through_pinhole(strip: Strip, kind: LandmarkKind, camera: Camera) -> Strip:
     return ideal
 
 
+def _whole(strip: Strip, camera: Camera) -> tuple[float, float, float]:
+    """Column, `Strip.front` and `Strip.aside` of a strip; of one side the picture may show nothing.
+
+    To the other one the kernel adds half of the width that a landmark has in the picture's middle.
+    Off the optical axis a round one is wider, by 1 / cos of that angle.
+    """
+    if strip.sides == 2:
+        return strip.column, strip.front, strip.aside
+    off = strip.column - camera.center_x
+    wider = math.copysign(math.hypot(1, off / camera.constant) - 1, off)
+    aside = max(-1.0, min(strip.aside - wider, 1.0))
+    lower = math.sqrt(1 - aside**2) - math.sqrt(max(1 - strip.aside**2, 0.0))
+    return strip.column + wider * strip.width / 2, strip.front + lower, aside
+
+
 def measure(
     strip: Strip,
     kind: LandmarkKind,
@@ -194,14 +214,15 @@ def measure(
     # landmark stands at the picture's stamp.
     constant = camera.constant
     off = camera.center_y - strip.row
-    column = strip.column + strip.lean * off
+    column, front, aside = _whole(strip, camera)
+    column += strip.lean * off
     bearing = math.atan2((camera.center_x - column) * math.cos(pitch.angle), constant)
     rise = off / constant
     elevation = math.tan(math.atan(rise) + pitch.angle)
     longer = (1 + rise * rise) / (1 + elevation * elevation)
-    distance = range_of(strip.unit / longer, bearing, kind, camera, strip.front)
+    distance = range_of(strip.unit / longer, bearing, kind, camera, front, aside)
     relative = math.hypot(
-        UNIT_FACTOR * strip.unit_sigma, RANGE_FLOOR, 2 * elevation * pitch.sigma, pitch.sigma**2
+        UNIT_FACTOR * strip.unit_sigma, 2 * elevation * pitch.sigma, pitch.sigma**2
     )
     sigma = math.hypot(COLUMN_FACTOR * strip.column_sigma, COLUMN_FLOOR, LEAN_SIGMA * off)
     shown = seen or strip

@@ -31,6 +31,28 @@ void eye_encode(int id, int bits, char *code)
     code[segments] = '\0';
 }
 
+/* The only landmark of whose code this may be a part; 0 where there is none, or where it may be any of
+ * several, or one at several places. */
+int eye_only_one(const eye_task *task, const char *part, int count)
+{
+    int only = 0;
+    for (int id = 1; id < EYE_IDS; id++) {
+        char code[EYE_CODE_SIZE];
+        int segments = 2 * task->kinds[id].bits + 5;
+        if (task->kinds[id].bits == 0)
+            continue;
+        eye_encode(id, task->kinds[id].bits, code);
+        for (int at = 0; at + count <= segments; at++) {
+            if (memcmp(code + at, part, (size_t)count) != 0)
+                continue;
+            if (only)
+                return 0;
+            only = id;
+        }
+    }
+    return only;
+}
+
 /* Whether another landmark that there is would read as this code if one thing lay over the bit segments
  * ``first`` and ``last``, and over whatever is between them. */
 int eye_mistakable(const eye_task *task, const char *code, int segments, int first, int last)

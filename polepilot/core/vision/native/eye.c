@@ -48,7 +48,8 @@ static double thickest(const eye_task *task, int bits)
     return most;
 }
 
-/* Half of the columns between the silhouettes of a landmark whose segment covers ``unit`` rows. */
+/* Half of the columns between the silhouettes of a landmark whose segment covers ``unit`` rows, in the
+ * picture's middle: `measure` knows where that is. */
 static double half_width(const eye_task *task, const eye_kind *kind, double unit)
 {
     double radius = kind->aspect * kind->segment / 2;
@@ -99,7 +100,8 @@ static void note_scale(const eye_scale *scale, double thick, eye_strip *out)
  * has read, and then what the levels say. */
 static int read_strip(const eye_task *task, const eye_candidate *candidate,
                       eye_upright *upright, double thick, int sharp, int *id,
-                      eye_scale *scale, double levels[][EYE_LIGHTS], eye_strip *out)
+                      eye_scale *scale, double levels[][EYE_LIGHTS], eye_span *seen,
+                      eye_strip *out)
 {
     int segments = 2 * candidate->bits + 5, wanted = *id;
     char code[EYE_CODE_SIZE];
@@ -109,30 +111,30 @@ static int read_strip(const eye_task *task, const eye_candidate *candidate,
         return reason;
     note_scale(scale, thick, out);
     eye_take_leak(upright, scale->leak);
-    if (!eye_segment_levels(upright, scale, code, segments, levels))
+    if (!eye_segment_levels(upright, scale, code, segments, levels, seen))
         return EYE_NO_SCALE;
     double noise = scale->noise / sqrt(scale->unit > 1 ? scale->unit : 1);
     reason = eye_read(task, levels, segments, upright->channels, sharp, noise, out->width,
                       candidate->open_top || candidate->open_bottom, out->code, &out->tint);
-    int seen = reason == EYE_READ ? eye_decode(out->code, segments) : 0;
-    if (candidate->settled && seen != wanted) { /* its segments say too little one by one */
+    int read = reason == EYE_READ ? eye_decode(out->code, segments) : 0;
+    if (candidate->settled && read != wanted) { /* its segments say too little one by one */
         memcpy(out->code, code, sizeof out->code);
         out->tint = UNREAD;
         return EYE_READ;
     }
     if (reason != EYE_READ)
         return reason;
-    if (seen == 0)
+    if (read == 0)
         return EYE_NO_CODE;
-    *id = seen;
-    return seen == wanted ? EYE_READ : EYE_NO_CODE;
+    *id = read;
+    return read == wanted ? EYE_READ : EYE_NO_CODE;
 }
 
 /* Straightens, fits and reads a candidate; the reason where it is no code. */
 static int read_candidate(const eye_picture *picture, const eye_task *task,
                           const eye_candidate *candidate, double thick, int sharp,
                           eye_upright *upright, eye_scale *scale, double levels[][EYE_LIGHTS],
-                          eye_strip *out)
+                          eye_span *seen, eye_strip *out)
 {
     int id = candidate->id, before = 0, reason = EYE_NO_CODE, coloured = picture->channels == 3;
     for (int attempt = 0; attempt < ATTEMPTS && reason != EYE_READ && id != before; attempt++) {
@@ -144,7 +146,7 @@ static int read_candidate(const eye_picture *picture, const eye_task *task,
         out->column = upright->column;
         out->lean = upright->lean;
         before = id;
-        reason = read_strip(task, candidate, upright, thick, sharp, &id, scale, levels, out);
+        reason = read_strip(task, candidate, upright, thick, sharp, &id, scale, levels, seen, out);
         if (reason == EYE_READ && coloured && !sharp && scale->unit_sigma > SURE)
             eye_refine_scale(upright, task, out->code, candidate, scale);
     }
@@ -153,13 +155,6 @@ static int read_candidate(const eye_picture *picture, const eye_task *task,
     out->id = id;
     note_scale(scale, thick, out);
     return EYE_READ;
-}
-
-/* Whether more than half of an end bar is out of the picture. */
-static int lacks_bar(const eye_picture *p, const eye_scale *scale, int segments)
-{
-    double inner = segments / 2.0 - 1;
-    return eye_row_at(scale, -inner) < -0.5 || eye_row_at(scale, inner) > p->rows - 0.5;
 }
 
 /* Whether both sides of a strip are in the picture as far down and up as its rows are. */
@@ -184,6 +179,7 @@ static int examine(const eye_picture *picture, const eye_task *task,
     eye_upright upright;
     eye_scale scale;
     eye_side side;
+    eye_span seen;
     double doubt = 0;
     out->bits = candidate->bits;
     out->column = candidate->column;
@@ -192,7 +188,8 @@ static int examine(const eye_picture *picture, const eye_task *task,
     out->width = thick * out->unit;
     eye_encode(candidate->id, candidate->bits, out->code);
     int reason =
-        read_candidate(picture, task, candidate, thick, sharp, &upright, &scale, levels, out);
+        read_candidate(picture, task, candidate, thick, sharp, &upright, &scale, levels, &seen,
+                       out);
     if (reason != EYE_READ)
         return reason;
     if (scale.unit < SHORTEST || scale.blur > MOST_BLUR + 0.3 * scale.unit)
@@ -200,12 +197,15 @@ static int examine(const eye_picture *picture, const eye_task *task,
     const eye_kind *kind = task->kinds + out->id;
     if (kind->bits != candidate->bits)
         return EYE_UNKNOWN_ID;
+    /* The picture cuts it off so that it might be another one, or stand higher or lower. */
+    if (!eye_only_one(task, out->code + seen.first, seen.end - seen.first))
+        return EYE_CUT_OFF;
     double half = half_width(task, kind, scale.unit);
     reason = eye_fit_side(picture, &upright, half, kind->flat, &side);
     if (reason != EYE_READ)
         return reason;
-    /* Its lean is uncertain enough without half of a side. */
-    if (lacks_bar(picture, &scale, segments) && !shows_sides(picture, &upright, &side))
+    /* A nearer landmark's segments may have the proportions of these: the width has to tell. */
+    if ((seen.first > 2 || seen.end < segments - 2) && !shows_sides(picture, &upright, &side))
         return EYE_CUT_OFF;
     /* Pale far bars may be as bright as what is beside them: where colour is of no use, only those are
      * asked whose ends are not to be seen. */
@@ -214,7 +214,7 @@ static int examine(const eye_picture *picture, const eye_task *task,
                                   &doubt);
     if (reason != EYE_READ)
         return reason;
-    if (eye_in_front(picture, task, &upright, &scale, &side, out->code, levels, segments))
+    if (eye_in_front(picture, task, &upright, &scale, &side, out->code, levels, segments, &seen))
         return EYE_COVERED;
     out->side_noise = side.noise;
     out->sides = side.sides;
@@ -222,26 +222,29 @@ static int examine(const eye_picture *picture, const eye_task *task,
     out->sag = scale.sag;
     out->width = 2 * side.half;
     out->front = side.front;
+    out->aside = side.aside;
     out->unit_sigma = scale.unit_sigma;
     out->sag_sigma = scale.sag_sigma;
     /* The bearing is that of the middle row, and the lean has to tell where the strip is there. */
     double away = picture->rows / 2.0 - upright.bright_row;
     out->column_sigma = hypot(side.sigma, upright.lean_sigma * away);
-    double off = misfit(out, task->constant, sharp), most = most_misfit(out);
+    double bad = misfit(out, task->constant, sharp), most = most_misfit(out);
     double apart = eye_apart(picture, &upright, &scale, &side, out->code, segments) - LEAST_APART;
     if (apart < 0)
-        off += apart * apart / (USUAL_APART * USUAL_APART);
+        bad += apart * apart / (USUAL_APART * USUAL_APART);
     else
         most += MISFIT_APART * fmin(apart, MOST_APART);
+    out->unit_sigma = hypot(scale.unit_sigma, scale.unit_doubt);
+    out->sag_sigma = hypot(scale.sag_sigma, scale.sag_doubt);
     /* Half of the squares are the logarithm by which normal errors make a strip less likely. */
-    if (candidate->settled && apart >= 0 && off / 2 <= candidate->odds) {
+    if (candidate->settled && apart >= 0 && bad / 2 <= candidate->odds) {
         out->tint = fmax(out->tint, 0);
         return EYE_READ;
     }
-    if (!(off <= most) || out->tint == UNREAD) /* or no number */
+    if (!(bad <= most) || out->tint == UNREAD) /* or no number */
         return EYE_POOR_FIT;
     doubt /= USUAL_DOUBT;
-    return off + doubt * doubt > most ? EYE_NO_BAR : EYE_READ;
+    return bad + doubt * doubt > most ? EYE_NO_BAR : EYE_READ;
 }
 
 /* Whether a candidate that failed in colour gets a second chance: a far one whose colour is blurred, or one

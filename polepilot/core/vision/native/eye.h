@@ -26,7 +26,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define EYE_VERSION 3
+#define EYE_VERSION 4
 #define EYE_MOST_BITS 8
 #define EYE_MOST_SEGMENTS (2 * EYE_MOST_BITS + 5)
 #define EYE_CODE_SIZE 24 /* bytes of a code as text, '1' for bright, with room for its end */
@@ -86,7 +86,8 @@ typedef struct {
     double sag;          /* share by which rows per segment shrink from segment to segment, down */
     double lean;         /* columns per row, to the right going down */
     double width;        /* columns from side to side */
-    double front;        /* mean height of the surface that was measured, of the radius */
+    double front;        /* mean height of the surface that was measured, of the radius, */
+    double aside;        /* and how far to the right of its middle that was */
     double blur;         /* of the edges, rows */
     double noise;        /* what the fit leaves over, of bright - dark */
     double side_noise;   /* what the fit across the strip leaves over, of its peak */

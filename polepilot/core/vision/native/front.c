@@ -39,6 +39,8 @@
 #define SWELLS 0.45        /* columns by which a side stands out, and times as much elsewhere: */
 #define SWELLS_SPREAD 3.0
 #define BACKGROUND 0.25 /* of bright - dark: least light behind against which a side shows */
+#define MERGES 0.04     /* of bright - dark: what differs by less may be one thing */
+#define EDGE_SEEN 0.2   /* segments at the picture's edge that tell */
 #define STEP 0.06       /* of bright - dark, amid dark rows, and times the usual rest there: */
 #define STEP_SPREAD 4.0
 #define EDGE 1.1        /* rows, and times the blur, that a bright segment's edge lightens */
@@ -199,6 +201,11 @@ static double goes_on(const scene *s, const block *over)
     for (int k = 0; k <= 2 * TILTS; k++)
         if (same[0][k] && same[1][2 * TILTS - k])
             return CERTAIN;
+    /* Of a pole that a side of the picture cuts one side is all there is to see. */
+    for (int way = 0; way < 2; way++)
+        for (int k = TILTS - LEVEL_TILTS; k <= TILTS + LEVEL_TILTS; k++)
+            if (same[way][k] && !s->beside[1 - way].seen[OFF])
+                return CERTAIN;
     return at_most(most);
 }
 
@@ -233,7 +240,7 @@ static double other_paint(const scene *s, int i)
 
 /* How far each side stands out at every segment. In the channel in which the paint is darkest, bright
  * and dark segments have the same sides. */
-static void know_sides(scene *s, const eye_task *task)
+static void know_sides(scene *s, const eye_task *task, const eye_span *seen)
 {
     double values[EYE_MOST_SEGMENTS], trim = eye_limit(0.5 - 0.6 / s->scale->unit, 0.1, 0.3);
     for (int way = 0; way < 2; way++) {
@@ -251,7 +258,7 @@ static void know_sides(scene *s, const eye_task *task)
             width[k] = (to_side[AT] - from_side[AT]) * (behind[task->low] - at[task->low]) / room;
             values[n++] = width[k];
         }
-        s->shows[way] = n >= s->segments - 2;
+        s->shows[way] = n >= seen->end - seen->first - 2;
         s->straight[way] = eye_median(values, n);
     }
 }
@@ -383,10 +390,44 @@ static double evidence_of(const scene *s, const eye_upright *u, const block *ove
     return s->coloured && evidence <= ENOUGH ? evidence + swells(s, over) : evidence;
 }
 
+/* Whether what the picture shows last of a strip, at row ``edge``, is as black as what is beside it: then
+ * something else may begin anywhere in this run of dark segments. */
+static int merges(const scene *s, const eye_picture *p, const eye_upright *u, const eye_side *side,
+                  double from, double to)
+{
+    double own[3] = {0}, at[3];
+    int shown = 0, same = 0;
+    see(p, u, side, from, to, own);
+    for (int way = 0; way < 2; way++) {
+        if (!light_between(s->beside + way, OFF, from, to, at))
+            continue;
+        shown++;
+        same += apart(s, at, own) < MERGES + SAME_NOISE * s->scale->noise;
+    }
+    return same == shown;
+}
+
+/* Whether a strip that the picture cuts amid dark segments may be another one's, the end of which is
+ * hidden by something black that reaches to the picture's edge. */
+static int may_end_elsewhere(const scene *s, const eye_picture *p, const eye_task *task,
+                             const eye_upright *u, const eye_side *side, const eye_span *seen)
+{
+    int first = seen->first, end = seen->end;
+    double high = fmax(EDGE_SEEN * s->scale->unit, 2 * s->beside->step), last = p->rows - 1;
+    if (end < s->segments && s->code[end - 1] == '0' && merges(s, p, u, side, last - high, last))
+        while (s->code[end - 1] == '0')
+            end--;
+    if (first > 0 && s->code[first] == '0' && merges(s, p, u, side, 0, high))
+        while (s->code[first] == '0')
+            first++;
+    return (first > seen->first || end < seen->end) &&
+           !eye_only_one(task, s->code + first, end - first);
+}
+
 /* Whether something stands in front of bits, which makes one landmark of another. */
 int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *u,
                  const eye_scale *scale, const eye_side *side, const char *code,
-                 double levels[][EYE_LIGHTS], int segments)
+                 double levels[][EYE_LIGHTS], int segments, const eye_span *seen)
 {
     scene s; /* all but large tables set here */
     s.scale = scale;
@@ -409,10 +450,17 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
     }
     if (s.contrast <= 0)
         return 0;
+    if (seen->first > 0 || seen->end < segments) {
+        for (int way = 0; way < 2; way++)
+            fill_margin(p, u, side, &s, task->low, way ? 1 : -1, s.beside + way);
+        if (may_end_elsewhere(&s, p, task, u, side, seen))
+            return 1;
+    }
     int filled = 0, certain[EYE_MOST_SEGMENTS]; /* whether something is over a bit for certain */
     for (int i = 3; i < segments - 3; i += 2)
         for (int last = i; last < segments - 3; last += 2) {
-            if (last > i && (code[i] == '1' || code[last] == '1'))
+            if ((last > i && (code[i] == '1' || code[last] == '1')) || i < seen->first ||
+                last >= seen->end)
                 break;
             if (!eye_mistakable(task, code, segments, i, last))
                 continue;
@@ -422,7 +470,7 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
                 s.has_rows = know_dark_rows(&s, u);
                 s.coloured = eye_is_coloured(p->channels, task);
                 if (s.coloured)
-                    know_sides(&s, task);
+                    know_sides(&s, task, seen);
                 for (int k = 3; k < segments - 3; k += 2) {
                     block one = block_of(&s, p, u, side, k, k);
                     certain[k] = code[k] == '0' && goes_on(&s, &one) >= CERTAIN;

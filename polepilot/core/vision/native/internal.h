@@ -49,16 +49,22 @@ typedef struct {
     double middle, unit;         /* row of the code's middle; rows per segment there */
     double sag, blur;            /* as in eye_strip */
     double growth;               /* rows by which bright segments seem to grow at either end */
-    double unit_sigma, sag_sigma; /* standard deviations: share of unit; of sag */
+    double unit_sigma, sag_sigma; /* standard deviations: share of unit; of sag; */
+    double unit_doubt, sag_doubt; /* and what errors that all edges may have add to them */
     double noise;                /* rms rest of the fit, of bright - dark */
     double leak;                 /* share of what is beside the strip that is blurred into it */
 } eye_scale;
+
+/* The segments that the picture shows. */
+typedef struct {
+    int first, end;
+} eye_span;
 
 /* Its place across. */
 typedef struct {
     double column, half, blur; /* middle, half width, softness of the sides; columns */
     double sigma;              /* of ``column`` */
-    double front, noise;       /* as in eye_strip: front, side_noise */
+    double front, aside, noise; /* as in eye_strip; side_noise */
     int sides;
 } eye_side;
 
@@ -80,7 +86,7 @@ void eye_refine_scale(const eye_upright *upright, const eye_task *task, const ch
                       const eye_candidate *candidate, eye_scale *scale);
 void eye_take_leak(eye_upright *upright, double leak);
 int eye_segment_levels(const eye_upright *upright, const eye_scale *scale, const char *code,
-                       int segments, double levels[][EYE_LIGHTS]);
+                       int segments, double levels[][EYE_LIGHTS], eye_span *seen);
 int eye_read(const eye_task *task, double levels[][EYE_LIGHTS], int segments, int channels, int sharp,
              double noise, double width, int open, char *code, double *tint);
 int eye_fit_side(const eye_picture *picture, const eye_upright *upright, double half, int flat,
@@ -92,7 +98,7 @@ double eye_apart(const eye_picture *picture, const eye_upright *upright, const e
                  const eye_side *side, const char *code, int segments);
 int eye_in_front(const eye_picture *picture, const eye_task *task, const eye_upright *upright,
                  const eye_scale *scale, const eye_side *side, const char *code,
-                 double levels[][EYE_LIGHTS], int segments);
+                 double levels[][EYE_LIGHTS], int segments, const eye_span *seen);
 
 /* ---- numbers ---- */
 
@@ -106,6 +112,7 @@ double eye_median(double *values, int n);
 int eye_solve(double *matrix, double *right, int n, int rights);
 int eye_decode(const char *code, int segments);
 void eye_encode(int id, int bits, char *code);
+int eye_only_one(const eye_task *task, const char *part, int count);
 int eye_mistakable(const eye_task *task, const char *code, int segments, int first, int last);
 
 static inline int eye_clamp(int value, int low, int high)

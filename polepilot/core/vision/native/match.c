@@ -2,16 +2,9 @@
 #include "search.h"
 
 #include <math.h>
-#include <string.h>
 
-#define SLACK 0.28f     /* share of a segment by which a run may miss its length or place */
-#define ROUNDING 0.75f  /* rows by which it may miss besides */
-#define FRAYED 0.35f    /* rows by which a bar may be shorter besides: its end has lost colour */
 #define SHALLOWEST 0.7 /* share of the dimmest run above which fences are none */
-#define BAR 2.0f        /* segments of an end bar, */
-#define CUT_BAR 1.5f    /* and what shows at least of one that the picture's edge cuts, */
-#define CUT_UNIT 6.0f   /* or nothing where segments have as many rows: then the pole is near, */
-#define BOTH_CUT 0.5f   /* but so much of one bar if both are cut */
+#define CUT_BAR 1.5f    /* and what shows at least of one that the picture's edge cuts */
 
 /* The bits that ``ones`` runs after ``upper`` say, each a segment long and at its place; else 0. */
 static int read_runs(const eye_run *upper, int ones, int bits, float top, float unit, float slack)
@@ -32,7 +25,7 @@ static int read_runs(const eye_run *upper, int ones, int bits, float top, float 
 
 /* The dimmest of the runs from ``upper`` to ``lower`` against the brightest valley between them; 0
  * where that is hardly darker. */
-static int contrast_of(const eye_run *upper, const eye_run *lower)
+int eye_contrast(const eye_run *upper, const eye_run *lower)
 {
     int dimmest = lower->peak, brightest = 0;
     for (const eye_run *one = upper; one < lower; one++) {
@@ -50,18 +43,18 @@ static inline int are_bars(const eye_hits *hits, const eye_run *upper, const eye
     float above = upper->end - upper->start, below = lower->end - lower->start;
     int cut_above = upper->start <= 0.0f;
     int cut_below = lower->end >= (float)(hits->picture->rows - 1);
-    float slack = SLACK * unit + (ROUNDING + FRAYED), whole = BAR * unit - slack;
-    float cut = unit < CUT_UNIT ? CUT_BAR * unit - slack : 0;
+    float slack = EYE_SLACK * unit + (EYE_ROUNDING + EYE_FRAYED), whole = EYE_BAR * unit - slack;
+    float cut = unit < EYE_CUT_UNIT ? CUT_BAR * unit - slack : 0;
     return above >= (cut_above ? cut : whole) && below >= (cut_below ? cut : whole) &&
-           (!cut_above || !cut_below || above >= BOTH_CUT * unit || below >= BOTH_CUT * unit) &&
-           fabsf(one->end - one->start - unit) <= SLACK * unit + ROUNDING;
+           (!cut_above || !cut_below || above >= EYE_BOTH_CUT * unit || below >= EYE_BOTH_CUT * unit) &&
+           fabsf(one->end - one->start - unit) <= EYE_SLACK * unit + EYE_ROUNDING;
 }
 
 /* Adds the code between two end bars; whether there is one. */
 static int match_bars(eye_hits *hits, const eye_run *upper, const eye_run *lower, int bits,
                       float unit, float column)
 {
-    float slack = SLACK * unit + ROUNDING, little = CUT_BAR * unit - slack - FRAYED;
+    float slack = EYE_SLACK * unit + EYE_ROUNDING, little = CUT_BAR * unit - slack - EYE_FRAYED;
     float above = upper->end - upper->start, below = lower->end - lower->start;
     int cut_above = upper->start <= 0.0f;
     int cut_below = lower->end >= (float)(hits->picture->rows - 1);
@@ -70,7 +63,7 @@ static int match_bars(eye_hits *hits, const eye_run *upper, const eye_run *lower
     if ((cut_above && above < least) || (cut_below && below < least))
         return 0;
     int id = read_runs(upper, (int)(lower - upper) - 1, bits, upper->end, unit, slack);
-    int contrast = id ? contrast_of(upper, lower) : 0;
+    int contrast = id ? eye_contrast(upper, lower) : 0;
     if (contrast == 0 || hits->n_hits >= EYE_MOST_HITS)
         return 0;
     hits->hits[hits->n_hits++] = (eye_hit){
@@ -79,62 +72,26 @@ static int match_bars(eye_hits *hits, const eye_run *upper, const eye_run *lower
         .bottom = lower->start,
         .bits = (int16_t)bits,
         .id = (int16_t)id,
-        .open_top = cut_above || above > BAR * unit + slack,
-        .open_bottom = cut_below || below > BAR * unit + slack,
+        .open_top = cut_above || above > EYE_BAR * unit + slack,
+        .open_bottom = cut_below || below > EYE_BAR * unit + slack,
         .contrast = (uint8_t)contrast,
         .cut = above < little || below < little,
     };
     return 1;
 }
 
-/* The code of which one end bar is out of the picture: the inner part goes on to the picture's edge,
- * and it is the bits that tell where it ends. The bar is an empty run at that edge. */
-static void match_cut(eye_hits *hits, const eye_run *runs, int count, int bits, float column)
-{
-    float segments = (float)(2 * bits + 1), edge = (float)hits->picture->rows - 0.5f;
-    eye_run few[EYE_MOST_BITS + 2];
-    for (int ones = 1; ones <= bits && ones < count; ones++) {
-        const eye_run *upper = runs + count - 1 - ones, *lower = runs + ones;
-        float unit = (edge - upper->end) / segments;
-        few[ones + 1] = (eye_run){edge, edge, upper->peak, 0};
-        if (unit >= CUT_UNIT && are_bars(hits, upper, few + ones + 1, upper + 1, unit)) {
-            memcpy(few, upper, sizeof *few * (size_t)(ones + 1));
-            if (match_bars(hits, few, few + ones + 1, bits, unit, column)) {
-                eye_hit *h = hits->hits + hits->n_hits - 1;
-                int last = bits - 1;
-                while (!(h->id >> last & 1))
-                    last--;
-                h->bottom = h->top + segments * (few[ones].end - h->top) / (float)(2 * last + 2);
-            }
-        }
-        unit = (lower->start + 0.5f) / segments;
-        few[0] = (eye_run){-0.5f, -0.5f, lower->peak, 0};
-        if (unit >= CUT_UNIT && are_bars(hits, few, lower, runs, unit)) {
-            memcpy(few + 1, runs, sizeof *few * (size_t)(ones + 1));
-            if (match_bars(hits, few, few + ones + 1, bits, unit, column)) {
-                eye_hit *h = hits->hits + hits->n_hits - 1;
-                int from_end = bits;
-                while (!(h->id >> (bits - from_end) & 1))
-                    from_end--;
-                h->top = h->bottom -
-                         segments * (h->bottom - few[1].start) / (float)(2 * from_end);
-            }
-        }
-    }
-}
-
 /* Every sequence of runs that looks like a code becomes a hit. */
 void eye_match_runs(eye_hits *hits, const eye_run *runs, int count, float column)
 {
+    eye_match_cut(hits, runs, count, column);
     for (int b = 0; b < hits->n_bits; b++) {
         int bits = hits->bits[b];
         float segments = (float)(2 * bits + 1); /* of the inner part */
-        match_cut(hits, runs, count, bits, column);
         for (int i = 0; i + 2 < count; i++) {
             const eye_run *upper = runs + i;
             /* How long the inner part is at most, where the run is an end bar as a whole. */
-            float bar = upper->end - upper->start + (FRAYED + ROUNDING);
-            float most = upper->start <= 0.0f ? 1e9f : segments * bar / (BAR - SLACK);
+            float bar = upper->end - upper->start + (EYE_FRAYED + EYE_ROUNDING);
+            float most = upper->start <= 0.0f ? 1e9f : segments * bar / (EYE_BAR - EYE_SLACK);
             if (most < segments * EYE_SHORTEST)
                 continue;
             for (int ones = 1; ones <= bits && i + ones + 1 < count; ones++) {

@@ -11,7 +11,7 @@
 #include <math.h>
 #include <string.h>
 
-#define MOST_ROWS 96    /* that are looked at: a multiple of four */
+#define MOST_ROWS 160   /* that are looked at: a multiple of four */
 #define HALF 6          /* columns to either side of a place across that are told apart; */
 #define TAPS (2 * HALF + 1)
 #define NEARER 3.5      /* from so many off they count less */
@@ -138,14 +138,31 @@ static int make_taps(double wide, double off, float *light, float *more)
     return 1;
 }
 
+static int has_bits(const eye_task *task, int bits)
+{
+    for (int id = 1; id < EYE_IDS; id++)
+        if (task->kinds[id].bits == bits)
+            return 1;
+    return 0;
+}
+
+static int longest_of(const eye_task *task)
+{
+    int bits = EYE_MOST_BITS;
+    while (bits > 0 && !has_bits(task, bits))
+        bits--;
+    return bits;
+}
+
 /* The light about a candidate; 0 where there is too much of it, or nothing beside it. */
 static int fill_field(const eye_picture *p, const eye_task *task, const eye_candidate *c,
                       double wide, double unit, int segments, field *out)
 {
-    double reach = (segments / 2.0 + BEYOND) * unit * (1 + STEP_SIZE * CLIMBS) + CLIMBS * STEP * unit;
+    int longest = 2 * longest_of(task) + 5;
+    double reach = (longest - segments / 2.0 + BEYOND) * (1 + STEP_SIZE * CLIMBS) + CLIMBS * STEP;
     double middle = (c->top + c->bottom) / 2;
-    int top = eye_clamp(eye_floor(middle - reach), 0, p->rows - 1);
-    int bottom = eye_clamp(eye_ceil(middle + reach), 0, p->rows - 1);
+    int top = eye_clamp(eye_floor(middle - reach * unit), 0, p->rows - 1);
+    int bottom = eye_clamp(eye_ceil(middle + reach * unit), 0, p->rows - 1);
     int left = (int)lround(c->column) - (ACROSS - 1) / 4;
     if (bottom - top >= MOST_ROWS - FOUR || !make_taps(wide, 0, out->taps[0][0], out->taps[0][1]) ||
         !make_taps(wide, 0.5, out->taps[1][0], out->taps[1][1]))
@@ -406,7 +423,29 @@ static int climb(field *f, spot here, int bits, likeliest *best)
     }
     try_about(f, best->at, unit, bits, &aslant, best);
     try_about(f, best->at, unit, bits, &fine, best);
-    return best->odds[best->id] > ENOUGH - HOPELESS;
+    return best->id != 0 && best->odds[best->id] > ENOUGH - HOPELESS;
+}
+
+/* The odds of the likeliest code of another length: of the same height, or of the same segments from either
+ * end on, or about the middle. */
+static double odds_of_others(field *f, const eye_task *task, int bits, const spot *at)
+{
+    double most = 0;
+    for (int other = 1; other <= EYE_MOST_BITS; other++) {
+        if (other == bits || !has_bits(task, other))
+            continue;
+        double sizes[] = {1, (2 * bits + 5) / (2.0 * other + 5), (2 * bits + 1) / (2.0 * other + 1)};
+        for (int k = 0; k < 3; k++)
+            for (int way = k ? 0 : -1; way <= (k ? 0 : 1); way++) {
+                spot here = {.row = at->row + way * (other - bits) * at->unit,
+                             .unit = at->unit * sizes[k], .across = at->across};
+                likeliest best = {.id = 0};
+                f->free = (int)((2 * other + 5) * here.unit) - 2;
+                climb(f, here, other, &best);
+                most = fmax(most, best.odds[best.id]);
+            }
+    }
+    return most;
 }
 
 /* Puts a candidate where the likeliest of all codes is, as far as that can be told; 0 where none is
@@ -419,12 +458,14 @@ int eye_weigh_codes(const eye_picture *p, const eye_task *task, double aspect, e
     field f;
     likeliest best = {.id = 0};
     if (!fill_field(p, task, c, aspect * unit, unit, segments, &f))
-        return 1; /* too long, or too wide, for this */
+        return 1; /* too long for this: it is examined where it is */
     if (!climb(&f, here, c->bits, &best))
         return 0;
     for (int id = 0; id < 1 << c->bits; id++)
         if (id != best.id && best.odds[id] > rival)
             rival = best.odds[id];
+    if (odds_of_others(&f, task, c->bits, &best.at) > best.odds[best.id] - ENOUGH_APART)
+        return 0;
     double half = (segments / 2.0 - 2) * best.at.unit;
     c->odds = fmin(best.odds[best.id] - ENOUGH, best.odds[best.id] - rival - ENOUGH_APART);
     c->id = best.id;

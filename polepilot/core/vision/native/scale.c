@@ -22,6 +22,8 @@
 #define LEAST_CONTRAST 0.002 /* light */
 #define MOST_LAG 3        /* rows over which what is left over may be alike */
 #define MOST_INFLATION 6.0
+#define EDGE_SIGMA 0.003  /* segments by which an edge is off besides: paint, lens, the pole's round end */
+#define BLURRED 3.54      /* rows over which an edge is spread, times its blur: 2 sqrt(pi) */
 #define ASTRAY 2.5        /* times the rest that the other channel leaves */
 #define USUAL_NOISE 0.1   /* rest, of bright - dark, that says nothing about a channel */
 #define RIDGE 1e-9
@@ -223,8 +225,16 @@ static double inflation(const double *rests, int n)
     return eye_limit(1 + 2 * sum, 1, MOST_INFLATION);
 }
 
+/* The variance of a row's light that makes an edge as uncertain as EDGE_SIGMA says, weighed as rows are. */
+static double edge_variance(const double *guess, double contrast, int bin)
+{
+    double off = EDGE_SIGMA * guess[EYE_UNIT] * contrast, spread = BLURRED * guess[EYE_BLUR];
+    double light = fabs(guess[EYE_DARK] + contrast / 2) + DARK_NOISE;
+    return off * off / (fmax(spread, (double)bin * bin) * light);
+}
+
 /* What a fit has found, and how uncertain that is; the reason where it says nothing. */
-static int conclude(equations *sums, const double *guess, int rows, eye_scale *out)
+static int conclude(equations *sums, const double *guess, int rows, int bin, eye_scale *out)
 {
     double contrast = guess[EYE_BRIGHT] - guess[EYE_DARK];
     if (!(contrast > LEAST_CONTRAST))
@@ -235,6 +245,7 @@ static int conclude(equations *sums, const double *guess, int rows, eye_scale *o
     if (!eye_solve(sums->normal, inverse, EYE_PARAMETERS, 2))
         return EYE_NO_SCALE;
     double variance = inflation(sums->rests, rows) * sums->variance;
+    double more = edge_variance(guess, contrast, bin);
     out->middle = guess[EYE_MIDDLE];
     out->unit = guess[EYE_UNIT];
     out->sag = guess[EYE_SAG];
@@ -242,13 +253,16 @@ static int conclude(equations *sums, const double *guess, int rows, eye_scale *o
     out->growth = guess[EYE_GROWTH];
     out->leak = guess[EYE_LEAK];
     out->unit_sigma = sqrt(variance * inverse[EYE_UNIT * 2]) / guess[EYE_UNIT];
+    out->unit_doubt = sqrt(more * inverse[EYE_UNIT * 2]) / guess[EYE_UNIT];
     out->sag_sigma = 1.0;
+    out->sag_doubt = 0;
     /* Sag is shared by all poles of a picture and weighed against them later: here it is what the
      * code itself says, its prior taken out again. */
     double information = 1 / inverse[EYE_SAG * 2 + 1] - sums->sag_pull;
     if (information > 0) {
         out->sag = guess[EYE_SAG] * (information + sums->sag_pull) / information;
         out->sag_sigma = sqrt(variance / information);
+        out->sag_doubt = sqrt(more / information);
     }
     out->sag = eye_limit(out->sag, -MOST_SAG, MOST_SAG);
     out->noise = sqrt(sums->plain / rows) / contrast;
@@ -287,7 +301,7 @@ static int fit_channel(const eye_upright *u, profile *seen, const char *code,
         if (moved < SETTLED)
             break;
     }
-    return conclude(&sums, guess, to - from, out);
+    return conclude(&sums, guess, to - from, u->bin, out);
 }
 
 /* The mean of two estimates, weighed by their uncertainty; where they contradict each other it is

@@ -14,6 +14,12 @@
 #define EYE_FAINT 32       /* quarters of a grey level of colour; what has less has none */
 #define EYE_BLEEDING 3     /* rows by which colour may go on beyond a code */
 #define EYE_BEYOND 3       /* numbers behind a running sum */
+#define EYE_SLACK 0.28f    /* share of a segment by which a run may miss its length or place */
+#define EYE_ROUNDING 0.75f /* rows by which it may miss besides */
+#define EYE_FRAYED 0.35f   /* rows by which a bar may be shorter besides: its end has lost colour */
+#define EYE_BAR 2.0f       /* segments of an end bar; */
+#define EYE_CUT_UNIT 6.0f  /* rows per segment from which on it may be out of the picture: the pole is near */
+#define EYE_BOTH_CUT 0.5f  /* so much shows at least of the only one that the picture does */
 
 /* A bright stretch of one column's signal. */
 typedef struct {
@@ -52,6 +58,8 @@ typedef struct {
 int eye_find_runs(const uint8_t *signal, int rows, eye_run *runs);
 int eye_smooth_runs(const eye_run *runs, int count, eye_run *smooth);
 void eye_match_runs(eye_hits *hits, const eye_run *runs, int count, float column);
+void eye_match_cut(eye_hits *hits, const eye_run *runs, int count, float column);
+int eye_contrast(const eye_run *upper, const eye_run *lower);
 void eye_match_comb(eye_hits *hits, const uint8_t *signal, int first, int last, int x, int known);
 void eye_match_faint(eye_hits *hits, int x);
 int eye_slide(const float *sum, int rows, int bits, float least, float most, int from, int end,

@@ -26,7 +26,7 @@
 #define LEAST_BLUR 0.25
 #define LEAST_HALF 0.4   /* of the half width that is expected */
 #define USUAL_FRONT 0.9
-#define CUT_SIGMA 0.05 /* of the half width: where a side is cut off its light is not known */
+#define CUT_SIGMA 0.015 /* of the half width: where a side is cut off its light is not known */
 
 /* The parameters; the model is linear in those before LEVELS. */
 enum {
@@ -98,10 +98,11 @@ static double model_column(double x, double size, const double *guess, const sur
     return sum;
 }
 
-/* The mean height of the surface over the columns that the profile averaged, of the radius. */
-static double front_of(const eye_upright *u, const double *guess)
+/* The mean height of the surface over the columns that the profile averaged, and its mean place to the
+ * right of the middle, of the radius. */
+static void look_at_front(const eye_upright *u, const double *guess, int flat, eye_side *out)
 {
-    double total = 0, sum = 0;
+    double total = 0, height = 0, place = 0;
     for (int i = 0; i < FINE_CELLS; i++) {
         double at = (2 * i + 1.0) / FINE_CELLS - 1;
         double offset = guess[MIDDLE] + guess[HALF] * at - u->column;
@@ -112,9 +113,11 @@ static double front_of(const eye_upright *u, const double *guess)
                         eye_cumulative((-u->half_window - offset) / guess[BLUR]);
         double weight = inside * (light > 0 ? light : 0);
         total += weight;
-        sum += weight * rise;
+        height += weight * rise;
+        place += weight * at;
     }
-    return total > 0 ? sum / total : USUAL_FRONT;
+    out->front = flat ? 1 : total > 0 ? height / total : USUAL_FRONT;
+    out->aside = total > 0 ? place / total : 0;
 }
 
 /* The entries that take part: about the strip, within the picture; 0 where there are too few. */
@@ -259,7 +262,7 @@ int eye_fit_side(const eye_picture *p, const eye_upright *u, double half, int fl
     out->blur = guess[BLUR];
     out->sigma = sqrt(sums.variance * inverse[MIDDLE]) + (cut ? CUT_SIGMA * half : 0);
     out->noise = sqrt(sums.plain) / peak;
-    out->front = flat ? 1.0 : front_of(u, guess);
+    look_at_front(u, guess, flat, out);
     int whole = guess[MIDDLE] - half >= -0.5 && guess[MIDDLE] + half <= p->columns - 0.5;
     out->sides = whole ? 2 : 1;
     return EYE_READ;

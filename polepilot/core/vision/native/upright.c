@@ -27,7 +27,10 @@
 #define ROWS_A_UNIT 5.0 /* and how many are kept if there are many more */
 #define THIN 3.0        /* half of the columns looked at: nothing is blurred into the midst of more */
 #define OUTSIDE 3       /* columns at either end that say what is beside the strip */
-#define LEAN_NOISE 0.0065 /* of the width: how far off the lean has the bright segments */
+#define LEAN_NOISE 0.0085 /* of the width: how far off the lean has the bright segments */
+#define LEAST_CUT 6.0    /* columns of a strip of which one side is looked for by itself, */
+#define CUT_MARGIN 0.3   /* share of what shows of it that is left out at that side, */
+#define HALF_PEAK 0.5    /* where it has so much of its light */
 #define BESIDE 2.0      /* columns from the strip's side to what is beside it */
 
 /* The rows of one run of the code, averaged. */
@@ -157,9 +160,15 @@ static void difference(const band *bands, int n, int columns, int step, double r
         level_out(out, columns);
 }
 
-static double energy(const float *values, int n)
+/* How much a difference stands out: its energy, or (``edges``) that of its slope. Of a strip that the
+ * picture's side cuts only one silhouette is seen, and that is where the slope is. */
+static double energy(const float *values, int n, int edges)
 {
     double sum = 0;
+    for (int i = 1; edges && i < n; i++)
+        sum += (double)(values[i] - values[i - 1]) * (values[i] - values[i - 1]);
+    if (edges)
+        return sum;
     for (int i = 0; i < n; i++)
         if (values[i] > 0)
             sum += (double)values[i] * values[i];
@@ -169,7 +178,7 @@ static double energy(const float *values, int n)
 /* The lean under which the difference stands out most; ``stands``: how much it stands out without
  * one, as a share of that. */
 static double find_lean(const band *bands, int n, int columns, int step, double row, double length,
-                        double wide, int sharp, double *stands)
+                        double wide, int sharp, int edges, double *stands)
 {
     float values[EYE_MOST_COLUMNS];
     double best = -1, best_lean = 0;
@@ -180,7 +189,7 @@ static double find_lean(const band *bands, int n, int columns, int step, double 
     for (int i = -reach; i <= reach; i++) {
         double lean = i * apart;
         difference(bands, n, columns, step, row, lean, 0, sharp, values);
-        double e = energy(values, columns);
+        double e = energy(values, columns, edges);
         if (i == 0)
             *stands = e;
         if (e > best) {
@@ -194,7 +203,7 @@ static double find_lean(const band *bands, int n, int columns, int step, double 
         double e[3];
         for (int i = 0; i < 3; i++) {
             difference(bands, n, columns, step, row, best_lean + (i - 1) * apart, 0, sharp, values);
-            e[i] = energy(values, columns);
+            e[i] = energy(values, columns, edges);
         }
         double bend = e[0] - 2 * e[1] + e[2];
         double move = bend < 0 ? 0.5 * (e[0] - e[2]) / bend : 0;
@@ -205,14 +214,15 @@ static double find_lean(const band *bands, int n, int columns, int step, double 
 }
 
 /* Rows well inside every run of the code that is in the picture, as bands with the weights of
- * bright - dark. */
+ * bright - dark; how many, 0 where only bright or only dark ones are there. ``whole``: all of them. */
 static int fill_bands(const eye_picture *p, const eye_task *task, const eye_candidate *c,
                       const char *code, int segments, double unit, int first, int step,
-                      int columns, int sharp, band *bands)
+                      int columns, int sharp, band *bands, int *whole)
 {
     /* Kept off the edges, but for the middle row at least. */
     double trim = eye_limit(0.5 * unit - 0.52, 0, 0.2 * unit + 0.6);
     int n = 0, bright_weight = 0, darks = 0;
+    *whole = 1;
     for (int i = 1; i < segments - 1;) {
         int end = i;
         while (end < segments - 1 && code[end] == code[i])
@@ -221,13 +231,17 @@ static int fill_bands(const eye_picture *p, const eye_task *task, const eye_cand
         double from = c->top + (i - 2) * unit + trim, to = c->top + (end - 2) * unit - trim;
         int weight = bright ? (bar ? 1 : 2) : 0;
         i = end;
-        if (bar && (to < 0 || from > p->rows - 1)) /* out of the picture */
+        if (to < 0 || from > p->rows - 1) { /* out of the picture */
+            *whole = 0;
             continue;
+        }
         fill_band(p, task, from, to, first, step, columns, sharp, bands + n);
         bands[n++].weight = weight;
         bright_weight += weight;
         darks += !bright;
     }
+    if (!bright_weight || !darks)
+        return 0;
     for (int i = 0; i < n; i++)
         bands[i].weight = bands[i].weight > 0 ? bands[i].weight / bright_weight : -1.0 / darks;
     return n;
@@ -282,6 +296,8 @@ static void fill_profile(const eye_picture *p, const eye_task *task, double top,
     last = eye_clamp(last, 0, p->rows - 1);
     int rows = (last - first + 1) / bin;
     rows = rows > EYE_MOST_ROWS ? EYE_MOST_ROWS : rows;
+    if (last == p->rows - 1) /* none is left out where the picture ends amid a code */
+        first = last + 1 - rows * bin;
     out->bin = bin;
     out->rows = rows;
     out->first = first - 0.5;
@@ -353,6 +369,43 @@ static int find_middle(const eye_upright *u, double wide, double *middle)
     return 1;
 }
 
+/* Which side of the picture cuts a candidate: -1 the left one, 1 the right one, 0 neither. */
+static int cut_by(const eye_picture *p, const eye_candidate *c, double wide)
+{
+    if (wide < LEAST_CUT)
+        return 0;
+    return c->column - wide / 2 < -0.5 ? -1 : c->column + wide / 2 > p->columns - 0.5;
+}
+
+/* What shows of a strip that a side of the picture cuts, in all rows between two: its middle, and in
+ * ``half_window`` half of it. 0 where there is next to nothing. */
+static int find_rest(const eye_picture *p, eye_upright *u, double wide, int cut, double top,
+                     double bottom)
+{
+    float peak = 0;
+    int at = 0, best = 0;
+    for (int i = 0; i < u->columns; i++)
+        if (u->across[i] > peak) {
+            peak = u->across[i];
+            best = i;
+        }
+    if (peak < LEAST_SIGNAL)
+        return 0;
+    for (at = best; at - cut >= 0 && at - cut < u->columns; at -= cut)
+        if (u->across[at] <= HALF_PEAK * peak)
+            break;
+    double side = u->across_first + (at + cut / 2.0) * u->step;
+    double most = fmax(u->lean * (fmax(top, 0) - u->row) * cut,
+                       u->lean * (fmin(bottom, p->rows - 1) - u->row) * cut);
+    double edge = (cut < 0 ? 0 : p->columns - 1) - cut * most;
+    double shows = fmin((edge - side) * cut, wide);
+    double margin = fmin(CUT_MARGIN * shows, (1 - LOOKED_AT) / 2 * wide);
+    shows = fmin(shows, wide - margin);
+    u->half_window = (shows - margin) / 2;
+    u->column = side + cut * (shows + margin) / 2;
+    return u->half_window >= LEAST_LOOKED_AT;
+}
+
 /* Sets a candidate upright; the reason where that cannot be. ``aspect``: thickness in segments. */
 int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candidate *c,
                    const char *code, double aspect, int sharp, eye_upright *out)
@@ -370,14 +423,16 @@ int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candida
     int columns = (int)(2 * reach / step) + 2;
     columns = columns > EYE_MOST_COLUMNS ? EYE_MOST_COLUMNS : columns;
     band bands[2 * EYE_MOST_BITS + 4];
-    int n = fill_bands(p, task, c, code, segments, unit, first, step, columns, sharp, bands);
+    int whole;
+    int n = fill_bands(p, task, c, code, segments, unit, first, step, columns, sharp, bands, &whole);
     if (n < 2)
         return EYE_NO_CONTRAST;
-    know_lean(bands, n, bands[0].weight > 0 && bands[n - 1].weight > 0, wide, out);
+    int cut = cut_by(p, c, wide);
+    know_lean(bands, n, whole && !cut, wide, out);
     double across_first = first + (step - 1) / 2.0;
     cap_signal(bands, n, columns, (int)lround((c->column - across_first) / step));
     double stands = 0, lean = find_lean(bands, n, columns, step, row, length, wide > 2 ? wide : 2,
-                                        sharp, &stands);
+                                        sharp, cut, &stands);
     if (fabs(lean) > STEEPEST) {
         if (!sharp && (unit > UNSURE || stands < UPRIGHT))
             return EYE_LEANS;
@@ -394,13 +449,15 @@ int eye_straighten(const eye_picture *p, const eye_task *task, const eye_candida
     out->columns = columns;
     out->step = step;
     out->across_first = across_first;
-    int found = find_middle(out, wide, &out->column);
+    out->half_window = fmax(LOOKED_AT * wide / 2, LEAST_LOOKED_AT);
+    int found = cut || find_middle(out, wide, &out->column);
     if (c->settled && (!found || fabs(out->column - c->column) > SETTLED_COLUMN))
         out->column = c->column;
     else if (!found)
         return EYE_NO_CONTRAST;
+    if (cut && !find_rest(p, out, wide, cut, c->top - 2 * unit, c->bottom + 2 * unit))
+        return EYE_CUT_OFF;
     difference(bands, n, columns, step, row, lean, 1, sharp, out->across);
-    out->half_window = fmax(LOOKED_AT * wide / 2, LEAST_LOOKED_AT);
     fill_profile(p, task, c->top - 2 * unit, c->bottom + 2 * unit, unit, out);
     return EYE_READ;
 }

@@ -10,8 +10,9 @@
 #define LEAST_LEAK 0.01 /* share of what is beside the strip that is worth the work */
 #define SHOWS 5.0        /* times the blur: a boundary does not show farther away */
 #define MOST_SHIFT 1.2   /* half codes from the middle: light does not go on changing beyond */
+#define SEEN 0.3         /* share of a segment that lies in the picture if it is seen, */
+#define SEEN_ROWS 3.0    /* or so many rows */
 #define LEVEL_RIDGE 2e-3 /* rows of nothing: hold the levels that no row shows */
-#define SEEN 0.3         /* share of a segment that lies in the picture if it is seen */
 
 /* A step, and how it changes with its place and blur. */
 typedef struct {
@@ -145,39 +146,47 @@ void eye_take_leak(eye_upright *u, double leak)
     }
 }
 
-/* Gives segments of end bars that are out of the picture the light of their bar's other segment,
- * without that the mean light of the bright bits; 0 where any other one is out of the picture, or
- * both bars. */
-static int stand_in(const int *seen, const char *code, int segments, double levels[][EYE_LIGHTS])
+/* Gives segments that are out of the picture the light that they have in the code: those of an end bar
+ * that of the bar's other segment, without that the mean of the bright bits; others the mean of all
+ * bits, or fences, that are as bright. 0 where both bars are out of it, or all bright bits are. */
+static int stand_in(const eye_span *span, const char *code, int segments,
+                    double levels[][EYE_LIGHTS])
 {
-    double bits[EYE_LIGHTS] = {0};
-    int ones = 0, bars = 0;
+    int seen[EYE_MOST_SEGMENTS];
+    for (int i = 0; i < segments; i++)
+        seen[i] = i >= span->first && i < span->end;
+    double mean[2][EYE_LIGHTS] = {{0}};
+    int number[2] = {0}, bars = 0;
     for (int i = 2; i < segments - 2; i++) {
-        if (!seen[i])
-            return 0;
-        if (code[i] == '0')
-            continue;
+        int bright = code[i] == '1';
+        number[bright] += seen[i];
         for (int c = 0; c < EYE_LIGHTS; c++)
-            bits[c] += levels[i][c];
-        ones++;
+            mean[bright][c] += seen[i] ? levels[i][c] : 0;
     }
-    for (int c = 0; c < EYE_LIGHTS; c++)
-        bits[c] /= ones > 0 ? ones : 1;
+    if (!number[0] || !number[1])
+        return 0;
+    for (int c = 0; c < EYE_LIGHTS; c++) {
+        mean[0][c] /= number[0];
+        mean[1][c] /= number[1];
+    }
+    for (int i = 2; i < segments - 2; i++)
+        if (!seen[i])
+            memcpy(levels[i], mean[code[i] == '1'], sizeof *mean);
     for (int bar = 0; bar < 2; bar++) {
         int outer = bar ? segments - 1 : 0, inner = bar ? segments - 2 : 1;
         if (!seen[inner])
-            memcpy(levels[inner], seen[outer] ? levels[outer] : bits, sizeof bits);
+            memcpy(levels[inner], seen[outer] ? levels[outer] : mean[1], sizeof *mean);
         if (!seen[outer])
-            memcpy(levels[outer], levels[inner], sizeof bits);
+            memcpy(levels[outer], levels[inner], sizeof *mean);
         bars += seen[inner] || seen[outer];
     }
     return bars > 0;
 }
 
-/* Light of every segment with its neighbours' blur taken out, of every channel and of the brightness;
- * 0 where it cannot be told. */
+/* Light of every segment with its neighbours' blur taken out, of every channel and of the brightness,
+ * and which ``seen`` ones that comes from; 0 where it cannot be told. */
 int eye_segment_levels(const eye_upright *u, const eye_scale *scale, const char *code,
-                       int segments, double levels[][EYE_LIGHTS])
+                       int segments, double levels[][EYE_LIGHTS], eye_span *seen)
 {
     enum { MOST = EYE_MOST_SEGMENTS + 2 };
     double matrix[MOST * MOST] = {0}, right[MOST * EYE_LIGHTS] = {0};
@@ -221,11 +230,14 @@ int eye_segment_levels(const eye_upright *u, const eye_scale *scale, const char 
     if (!eye_solve(matrix, right, n, EYE_LIGHTS))
         return 0;
     double begin = u->first, end = u->first + u->rows * u->bin;
-    int seen[EYE_MOST_SEGMENTS];
+    *seen = (eye_span){segments, 0};
     for (int i = 0; i < segments; i++) {
+        double length = place[i + 1] - place[i];
         memcpy(levels[i], right + (i + 1) * EYE_LIGHTS, sizeof levels[i]);
-        seen[i] = fmin(place[i + 1], end) - fmax(place[i], begin) >=
-                  SEEN * (place[i + 1] - place[i]);
+        if (fmin(place[i + 1], end) - fmax(place[i], begin) < fmin(SEEN * length, SEEN_ROWS))
+            continue;
+        seen->first = i < seen->first ? i : seen->first;
+        seen->end = i + 1;
     }
     return stand_in(seen, code, segments, levels);
 }

@@ -116,12 +116,23 @@ static void match_bar(eye_hits *hits, const eye_run *bar, int ones, int most, in
     }
 }
 
+/* Whether a run is not too long for an end bar, if the one beside it is a bit: most are, or are short. */
+static inline int is_like_bar(const eye_run *bar, const eye_run *bit, int rows)
+{
+    float length = bit->end - bit->start;
+    return bit->start <= 0.0f || bit->end >= (float)(rows - 1) || /* of a cut one who knows */
+           bar->end - bar->start <= (EYE_BAR + 4 * SLACK) * length + 4 * ROUNDING;
+}
+
 /* Codes that are cut by the lower or upper edge of the picture. */
 void eye_match_cut(eye_hits *hits, const eye_run *runs, int count, float column)
 {
-    int most = hits->n_bits > 0 ? hits->bits[hits->n_bits - 1] : 0;
+    int most = hits->n_bits > 0 ? hits->bits[hits->n_bits - 1] : 0, rows = hits->picture->rows;
     for (int ones = 1; ones <= most && ones < count; ones++) {
-        match_bar(hits, runs + count - 1 - ones, ones, most, 1, column);
-        match_bar(hits, runs + ones, ones, most, 0, column);
+        const eye_run *upper = runs + count - 1 - ones, *lower = runs + ones;
+        if (is_like_bar(upper, upper + 1, rows))
+            match_bar(hits, upper, ones, most, 1, column);
+        if (is_like_bar(lower, lower - 1, rows))
+            match_bar(hits, lower, ones, most, 0, column);
     }
 }

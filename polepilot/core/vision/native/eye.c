@@ -27,7 +27,7 @@
 #define SHARP 5.0              /* rows per segment: blurred colour still parts them */
 #define FEW_ROWS 3.0           /* per segment: codes are weighed as a whole, */
 #define BLURRED 2.4            /* and even pixels blur segments */
-#define MOST_WEIGHS 4          /* in one picture: it takes as long as all else of a candidate */
+#define MOST_WEIGHS 3          /* in one picture: it takes as long as all else of a candidate */
 #define UNREAD (-1.0)          /* instead of a tint: not every segment reads by itself */
 #define NEAR 7.5               /* rows per segment: from here on strips fit well, */
 #define FAR 4.5                /* from here down they need not; */

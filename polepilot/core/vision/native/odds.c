@@ -26,7 +26,7 @@
 #define STEP_SIZE 0.04  /* and the share by which sizes differ */
 #define CLIMBS 4        /* steps that the likeliest may be off a candidate's place and size */
 #define LEAN 0.035      /* columns per row */
-#define PROMISING 8.0   /* odds, as a logarithm, where a candidate is: less is not looked at closely */
+#define PROMISING 12.0   /* odds, as a logarithm, where a candidate is: less is not looked at closely */
 #define ENOUGH 24.0     /* odds against no code at all */
 #define ENOUGH_APART 2.0 /* and against any other code */
 #define HOPELESS 6.0    /* and by how much less is of no use, however well it fits */

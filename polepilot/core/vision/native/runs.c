@@ -96,7 +96,7 @@ static int pass_bright(const uint8_t *s, int rows, int y, int least, extremum *p
     return y;
 }
 
-/* The bright runs of one column, top first; none where there are too many. */
+/* The bright runs of one column, top first; none where there are too many, or too few for a code. */
 int eye_find_runs(const uint8_t *s, int rows, eye_run *runs)
 {
     extremum peaks[EYE_MOST_RUNS], valleys[EYE_MOST_RUNS + 1], valley = {0, 0};
@@ -118,7 +118,7 @@ int eye_find_runs(const uint8_t *s, int rows, eye_run *runs)
         }
         valley = (extremum){s[y], y};
     }
-    if (count == EYE_MOST_RUNS)
+    if (count == EYE_MOST_RUNS || count < EYE_LEAST_RUNS)
         return 0;
     for (int i = 0; i < count; i++) {
         extremum above = valleys[i], below = valleys[i + 1], peak = peaks[i];

@@ -155,10 +155,10 @@ static void match(eye_hits *hits, const uint8_t *signal, int x)
 {
     eye_run runs[EYE_MOST_RUNS], smooth[EYE_MOST_RUNS];
     int n = eye_find_runs(signal, hits->picture->rows, runs);
-    if (n >= 2) { /* a bar and a bit, the other bar out of the picture */
+    if (n >= EYE_LEAST_RUNS) {
         eye_match_runs(hits, runs, n, (float)x);
         int left = eye_smooth_runs(runs, n, smooth);
-        if (left < n && left >= 2)
+        if (left < n && left >= EYE_LEAST_RUNS)
             eye_match_runs(hits, smooth, left, (float)x);
     }
 }

@@ -5,6 +5,7 @@
 #include "internal.h"
 
 #define EYE_MOST_RUNS 384 /* bright runs in one column */
+#define EYE_LEAST_RUNS 2  /* a bar and a bit, the other bar out of the picture */
 #define EYE_MOST_HITS 3000 /* a picture full of stripes has no landmark */
 #define EYE_MOST_SLIDES 2400 /* by faint colour, of one length each; 1600x1200 may need 2000 */
 #define EYE_MOST_LENGTHS 4 /* different numbers of bits that are looked for */

@@ -237,7 +237,7 @@ static int examine(const eye_picture *picture, const eye_task *task,
     out->unit_sigma = hypot(scale.unit_sigma, scale.unit_doubt);
     out->sag_sigma = hypot(scale.sag_sigma, scale.sag_doubt);
     /* Half of the squares are the logarithm by which normal errors make a strip less likely. */
-    if (candidate->settled && apart >= 0 && bad / 2 <= candidate->odds) {
+    if (candidate->settled && apart >= USUAL_APART && bad / 2 <= candidate->odds) {
         out->tint = fmax(out->tint, 0);
         return EYE_READ;
     }

@@ -25,7 +25,7 @@ NEAREST = 0.2
 """Nothing nearer than this is a landmark in front of the camera, metres."""
 RANGE_SHARE = 0.0005
 """Range error that does not depend on the distance, as a share of the range."""
-EDGE_PIXELS = 0.15
+EDGE_PIXELS = 0.16
 """Error of the code's length in the picture, pixels."""
 BEARING_SIGMA = math.radians(0.04)
 DROP_OUT = 0.03

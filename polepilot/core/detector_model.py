@@ -27,7 +27,7 @@ RANGE_SHARE = 0.0005
 """Range error that does not depend on the distance, as a share of the range."""
 EDGE_PIXELS = 0.16
 """Error of the code's length in the picture, pixels."""
-BEARING_SIGMA = math.radians(0.04)
+BEARING_SIGMA = math.radians(0.042)
 DROP_OUT = 0.03
 """Share of the whole landmarks in view that are not read."""
 SIGHT_MARGIN = 0.10

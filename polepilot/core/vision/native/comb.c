@@ -19,6 +19,7 @@
 #define FRAYED 11          /* rows by which a code may be shorter than its stretch of colour, */
 #define HIDDEN 2           /* and by which it may be longer */
 #define ROWS_APART 3       /* every third row is asked for faint colour */
+#define FAINT_GAP (GAP / ROWS_APART * ROWS_APART)
 #define LEAST_DEPTH 9.0f   /* grey levels of a valley */
 #define MOST_SUMS (3 * LONGEST + 32)
 
@@ -121,6 +122,14 @@ static int is_known(const eye_hits *hits, int known, int x, int from, int end)
     return 0;
 }
 
+static int peak_of(const uint8_t *signal, int from, int end)
+{
+    uint8_t peak = 0; /* a byte: many at a time */
+    for (int y = from; y <= end; y++)
+        peak = signal[y] > peak ? signal[y] : peak;
+    return peak;
+}
+
 /* Codes in column ``x``, whose signal between the rows ``first`` and ``last`` is given. The hits
  * from ``known`` on are those of its runs. */
 void eye_match_comb(eye_hits *hits, const uint8_t *signal, int first, int last, int x, int known)
@@ -130,15 +139,11 @@ void eye_match_comb(eye_hits *hits, const uint8_t *signal, int first, int last, 
     while (y <= last) {
         while (y <= last && signal[y] < EYE_LEAST_STEP)
             y++;
-        int from = y, end = y, peak = 0;
-        for (; y <= last && y - end <= GAP; y++)
-            if (signal[y] >= EYE_LEAST_STEP) {
-                end = y;
-                peak = signal[y] > peak ? signal[y] : peak;
-            }
+        int from = y, end = eye_end_of_stretch(signal, from, last, EYE_LEAST_STEP, GAP);
+        y = end + GAP + 1;
         int height = end - from + 1;
         if (from > last || height > LONGEST || (float)height < LEAST_SEGMENTS * EYE_SHORTEST ||
-            peak < 2 * EYE_LEAST_STEP || is_known(hits, known, x, from, end))
+            peak_of(signal, from, end) < 2 * EYE_LEAST_STEP || is_known(hits, known, x, from, end))
             continue;
         int top = from < BESIDE ? 0 : from - BESIDE;
         int bottom = end + BESIDE + 1 < rows ? end + BESIDE + 1 : rows;
@@ -169,6 +174,19 @@ static int most_coloured(const eye_hits *hits, int x, int top, int bottom)
     return best;
 }
 
+/* As `eye_end_of_stretch`, of the rows with at least faint colour, of those that are asked. */
+static int end_of_faint(const eye_hits *hits, const uint8_t *column, int from)
+{
+    const eye_picture *p = hits->picture;
+    int end = from;
+    for (int y = from + FAINT_GAP; y > end; y -= ROWS_APART)
+        if (y < p->rows && eye_colour(column + y * p->stride, hits->task) > EYE_FAINT) {
+            end = y;
+            y = end + FAINT_GAP + ROWS_APART;
+        }
+    return end;
+}
+
 /* Codes in column ``x`` that have hardly any colour left, somewhere: by their brightness. That takes
  * long, so it ends when a picture speckled with colour has used up what a landmark may cost. */
 void eye_match_faint(eye_hits *hits, int x)
@@ -180,10 +198,8 @@ void eye_match_faint(eye_hits *hits, int x)
     while (y < p->rows && hits->slides > 0) {
         while (y < p->rows && eye_colour(column + y * p->stride, hits->task) <= EYE_FAINT)
             y += ROWS_APART;
-        int from = y, end = y;
-        for (; y < p->rows && y - end <= GAP; y += ROWS_APART)
-            if (eye_colour(column + y * p->stride, hits->task) > EYE_FAINT)
-                end = y;
+        int from = y, end = end_of_faint(hits, column, from);
+        y = end + FAINT_GAP + ROWS_APART;
         int height = end - from + 1;
         if (end == from || from >= p->rows || height > LONGEST || is_known(hits, 0, x, from, end))
             continue;

@@ -18,16 +18,16 @@ typedef struct {
     float begin[EYE_MOST_BITS], end[EYE_MOST_BITS]; /* rows from the bar */
 } shown;
 
-static void measure_runs(const eye_run *bar, int ones, int down, int rows, shown *out)
+/* Measures runs beside a bar, from the first one that has not been measured to ``ones`` of them. */
+static void measure_runs(const eye_run *bar, int ones, shown *out)
 {
-    out->down = down;
-    out->room = down ? (float)rows - 0.5f - bar->end : bar->start + 0.5f;
-    out->ones = ones;
-    for (int k = 0; k < ones; k++) {
+    int down = out->down;
+    for (int k = out->ones; k < ones; k++) {
         const eye_run *one = down ? bar + 1 + k : bar - 1 - k;
         out->begin[k] = down ? one->start - bar->end : bar->start - one->end;
         out->end[k] = down ? one->end - bar->end : bar->start - one->start;
     }
+    out->ones = ones;
 }
 
 static int is_cut(const shown *s, int k) { return s->end[k] >= s->room - 0.5f; }
@@ -46,7 +46,7 @@ static unsigned read_shown(const shown *s, float *unit)
     int last = -1;
     float slack = SLACK * *unit + ROUNDING;
     for (int k = 0; k < s->ones; k++) {
-        int bit = (int)floorf((s->begin[k] / *unit - 1) / 2 + 0.5f);
+        int bit = eye_floor((s->begin[k] / *unit - 1) / 2 + 0.5f);
         float length = s->end[k] - s->begin[k], begin = *unit * (float)(2 * bit + 1);
         if (bit <= last || bit >= EYE_MOST_BITS || fabsf(s->begin[k] - begin) > slack ||
             length > *unit + slack || (length < *unit - slack && !is_cut(s, k)))
@@ -83,7 +83,10 @@ static void match_bar(eye_hits *hits, const eye_run *bar, int ones, int most, in
     float length = bar->end - bar->start;
     int bar_cut = down ? bar->start <= 0.0f : bar->end >= (float)(rows - 1);
     shown s;
-    measure_runs(bar, ones, down, rows, &s);
+    s.down = down;
+    s.room = down ? (float)rows - 0.5f - bar->end : bar->start + 0.5f;
+    s.ones = 0;
+    measure_runs(bar, 1, &s); /* most bars fail by the first one */
     if (bar_cut && ones == 1 && is_cut(&s, 0)) /* no run as a whole: nothing tells its length */
         return;
     for (int first = 0; first < most; first++) {
@@ -93,6 +96,7 @@ static void match_bar(eye_hits *hits, const eye_run *bar, int ones, int most, in
         if (s.room < LEAST_SHOWN * unit ||
             length < (bar_cut ? EYE_BOTH_CUT * unit : whole - slack))
             continue;
+        measure_runs(bar, ones, &s);
         unsigned bright = read_shown(&s, &unit);
         int contrast = bright ? eye_contrast(down ? bar : bar - ones, down ? bar + ones : bar) : 0;
         if (contrast == 0)

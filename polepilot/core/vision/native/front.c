@@ -79,6 +79,7 @@ typedef struct {
     int top, bottom; /* the run of dark segments that they are in, and the first segment below it */
     double level[3]; /* their mean light, */
     double seen[3];  /* and that of their middle as it is in the picture */
+    double along;    /* of dark ones: evidence that what is there goes on beside the pole */
 } block;
 
 static double row_of(const scene *s, double place)
@@ -370,6 +371,8 @@ static block block_of(const scene *s, const eye_picture *p, const eye_upright *u
         over.bottom++;
     double middle = (first + last + 1) / 2.0, half = half_of(&over);
     see(p, u, side, row_of(s, middle - half), row_of(s, middle + half), over.seen);
+    if (s->code[first] == '0')
+        over.along = goes_on(s, &over);
     return over;
 }
 
@@ -381,7 +384,7 @@ static double evidence_of(const scene *s, const eye_upright *u, const block *ove
     double paint = bright ? other_paint(s, over->first) : 0;
     if (bright && paint < LIKE_PAINT)
         return 0;
-    double evidence = goes_on(s, over);
+    double evidence = bright ? goes_on(s, over) : over->along;
     if (evidence > ENOUGH || rows < LEAST_ROWS)
         return evidence;
     evidence += bright ? paint : other_black(s, over);
@@ -456,7 +459,8 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
         if (may_end_elsewhere(&s, p, task, u, side, seen))
             return 1;
     }
-    int filled = 0, certain[EYE_MOST_SEGMENTS]; /* whether something is over a bit for certain */
+    block alone[EYE_MOST_SEGMENTS]; /* every bit by itself */
+    int filled = 0;
     for (int i = 3; i < segments - 3; i += 2)
         for (int last = i; last < segments - 3; last += 2) {
             if ((last > i && (code[i] == '1' || code[last] == '1')) || i < seen->first ||
@@ -471,14 +475,13 @@ int eye_in_front(const eye_picture *p, const eye_task *task, const eye_upright *
                 s.coloured = eye_is_coloured(p->channels, task);
                 if (s.coloured)
                     know_sides(&s, task, seen);
-                for (int k = 3; k < segments - 3; k += 2) {
-                    block one = block_of(&s, p, u, side, k, k);
-                    certain[k] = code[k] == '0' && goes_on(&s, &one) >= CERTAIN;
-                }
+                for (int k = 3; k < segments - 3; k += 2)
+                    alone[k] = block_of(&s, p, u, side, k, k);
                 filled = 1;
             }
-            block over = block_of(&s, p, u, side, i, last);
-            if (certain[i] || certain[last] || evidence_of(&s, u, &over) > ENOUGH)
+            block over = last > i ? block_of(&s, p, u, side, i, last) : alone[i];
+            if (alone[i].along >= CERTAIN || alone[last].along >= CERTAIN ||
+                evidence_of(&s, u, &over) > ENOUGH)
                 return 1;
         }
     return 0;

@@ -12,10 +12,12 @@
 
 #define EYE_LANES 16 /* columns that are looked at together, */
 #define EYE_SPAN 96  /* and the bytes of a row that they are in */
+#define EYE_TURNED 8 /* rows that become columns together */
 
 typedef uint8_t eye_lanes __attribute__((vector_size(EYE_LANES)));
 typedef uint16_t eye_words __attribute__((vector_size(EYE_LANES)));
 typedef int16_t eye_signs __attribute__((vector_size(EYE_LANES)));
+typedef uint64_t eye_halves __attribute__((vector_size(EYE_LANES)));
 
 /* Which column a lane holds. */
 static const uint8_t eye_lane_column[EYE_LANES] = {0, 13, 3, 8, 6,  11, 1, 14,
@@ -61,6 +63,32 @@ static inline eye_signs eye_lesser(eye_signs one, eye_signs other)
 {
     eye_signs less = one < other;
     return (one & less) | (other & ~less);
+}
+
+/* Lets blocks of ``size`` rows and lanes change places: those at the right above with those at the left
+ * below. ``left``: the lanes of the left ones, in both halves. */
+static inline void eye_turn_blocks(eye_halves *rows, int size, uint64_t left)
+{
+    for (int i = 0; i < EYE_TURNED; i++)
+        if (!(i & size)) {
+            eye_halves change = (rows[i] >> 8 * size ^ rows[i + size]) & left;
+            rows[i + size] ^= change;
+            rows[i] ^= change << 8 * size;
+        }
+}
+
+/* Writes each lane of some rows as a column, ``apart`` bytes from one to the next. */
+static inline void eye_store_turned(const eye_lanes *rows, uint8_t *out, ptrdiff_t apart)
+{
+    eye_halves turned[EYE_TURNED];
+    memcpy(turned, rows, sizeof turned);
+    eye_turn_blocks(turned, 4, 0xFFFFFFFF);
+    eye_turn_blocks(turned, 2, 0xFFFF0000FFFF);
+    eye_turn_blocks(turned, 1, 0xFF00FF00FF00FF);
+    for (int lane = 0; lane < EYE_LANES; lane++) {
+        uint64_t column = turned[lane % EYE_TURNED][lane / EYE_TURNED];
+        memcpy(out + eye_lane_column[lane] * apart, &column, sizeof column);
+    }
 }
 
 /* Whether all lanes are 255. */

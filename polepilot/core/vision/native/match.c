@@ -4,6 +4,7 @@
 #include <math.h>
 
 #define SHALLOWEST 0.7 /* share of the dimmest run above which fences are none */
+#define SPARE 1.001f   /* times as long; less is left to exact comparisons */
 #define CUT_BAR 1.5f    /* and what shows at least of one that the picture's edge cuts */
 
 /* The bits that ``ones`` runs after ``upper`` say, each a segment long and at its place; else 0. */
@@ -13,7 +14,7 @@ static int read_runs(const eye_run *upper, int ones, int bits, float top, float 
     for (const eye_run *one = upper + 1; one <= upper + ones; one++) {
         float length = one->end - one->start;
         float middle = ((one->start + one->end) / 2 - top) / unit;
-        int bit = (int)floorf((middle - 1.5f) / 2 + 0.5f);
+        int bit = eye_floor((middle - 1.5f) / 2 + 0.5f);
         if (bit <= last || bit >= bits || fabsf(length - unit) > slack ||
             fabsf(middle - 1.5f - 2 * (float)bit) * unit > slack)
             return 0;
@@ -92,13 +93,21 @@ void eye_match_runs(eye_hits *hits, const eye_run *runs, int count, float column
             /* How long the inner part is at most, where the run is an end bar as a whole. */
             float bar = upper->end - upper->start + (EYE_FRAYED + EYE_ROUNDING);
             float most = upper->start <= 0.0f ? 1e9f : segments * bar / (EYE_BAR - EYE_SLACK);
+            /* And by the first bit: all but what rounding may do of what `are_bars` says. */
+            float bit = upper[1].end - upper[1].start;
+            float longest = SPARE * segments * (bit + EYE_ROUNDING) / (1 - EYE_SLACK);
+            float least = segments * (bit - EYE_ROUNDING) / (1 + EYE_SLACK) / SPARE;
+            most = longest < most ? longest : most;
             if (most < segments * EYE_SHORTEST)
                 continue;
             for (int ones = 1; ones <= bits && i + ones + 1 < count; ones++) {
                 const eye_run *lower = upper + ones + 1;
-                float length = lower->start - upper->end, unit = length / segments;
+                float length = lower->start - upper->end;
                 if (length > most)
                     break;
+                if (length < least)
+                    continue;
+                float unit = length / segments;
                 if (unit >= EYE_SHORTEST && are_bars(hits, upper, lower, upper + 1, unit))
                     match_bars(hits, upper, lower, bits, unit, column);
             }

@@ -14,11 +14,12 @@ typedef struct {
     int level, at;
 } extremum;
 
-/* From row ``y`` on past rows of nothing, eight at a time: most of a column is nothing. */
-static inline int pass_nothing(const uint8_t *s, int y, int to)
+/* From row ``y`` on past rows of nothing, eight at a time: most of a column is nothing. ``step``: 1
+ * down, -1 up. */
+static inline int pass_nothing(const uint8_t *s, int y, int to, int step)
 {
     uint64_t eight = 0;
-    if (to > y)
+    if (step > 0)
         while (y + 8 <= to && (memcpy(&eight, s + y, 8), eight == 0))
             y += 8;
     else
@@ -27,14 +28,14 @@ static inline int pass_nothing(const uint8_t *s, int y, int to)
     return y;
 }
 
-/* Where a run's edge lies: from the dark row at ``from`` (level ``valley``) towards ``to``.
+/* Where a run's edge lies: from the dark row at ``from`` (level ``valley``) towards ``to``, that is down
+ * (``step`` 1) or up (-1).
  *
  * The edge ends at a shoulder, not at the peak: behind a bar something brighter may go on. */
-static float edge(const uint8_t *s, int from, int to, int valley, int peak)
+static inline float edge(const uint8_t *s, int from, int to, int valley, int peak, int step)
 {
-    int step = to > from ? 1 : -1, y = from;
     int low = valley + (int)(LEAVES_DARK * (peak - valley));
-    y = pass_nothing(s, y, to);
+    int y = pass_nothing(s, from, to, step);
     while (y != to && s[y] <= low)
         y += step;
     int top = y;
@@ -62,17 +63,11 @@ static int pass_dark(const uint8_t *s, int rows, int y, int rise, extremum *vall
 {
     int level = valley->level, at = valley->at;
     for (; y < rows; y++) {
-        if (s[y] == 0) {
-            y = pass_nothing(s, y, rows);
-            level = 0;
-            at = y > 0 ? y - 1 : 0;
-            if (y >= rows)
-                break;
-        }
         if (s[y] <= level) {
             level = s[y];
+            y = level == 0 ? pass_nothing(s, y + 1, rows, 1) - 1 : y;
             at = y;
-        } else if (s[y] - level > rise) {
+        } else if (s[y] > level + rise) {
             break;
         }
     }
@@ -83,12 +78,13 @@ static int pass_dark(const uint8_t *s, int rows, int y, int rise, extremum *vall
 /* Follows a run from row ``y`` on to where it falls for good, or to the end; finds its peak. */
 static int pass_bright(const uint8_t *s, int rows, int y, int least, extremum *peak)
 {
-    int level = s[y], at = y;
+    int level = s[y], at = y, low = level - least_change(level, least);
     for (; y < rows; y++) {
         if (s[y] > level) {
             level = s[y];
             at = y;
-        } else if (level - s[y] > least_change(level, least)) {
+            low = level - least_change(level, least);
+        } else if (s[y] < low) {
             break;
         }
     }
@@ -128,9 +124,9 @@ int eye_find_runs(const uint8_t *s, int rows, eye_run *runs)
         if (i == 0 && s[above.at] > LEAVES_DARK * peak.level)
             runs[i].start = -0.5f;
         else
-            runs[i].start = edge(s, above.at, peak.at, above.level, peak.level);
+            runs[i].start = edge(s, above.at, peak.at, above.level, peak.level, 1);
         runs[i].end = below.at >= rows ? (float)rows - 0.5f
-                                       : edge(s, below.at, peak.at, below.level, peak.level);
+                                       : edge(s, below.at, peak.at, below.level, peak.level, -1);
     }
     return count;
 }

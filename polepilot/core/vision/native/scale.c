@@ -128,6 +128,8 @@ static int fit_levels(const eye_upright *u, const profile *seen, const eye_wave 
         double upper = u->first + i * u->bin;
         eye_wave_row(wave, &at, guess, upper, upper + u->bin, seen->beside[i], row);
         for (int a = 0; a < EYE_LINEAR; a++) {
+            if (row[a] == 0)
+                continue;
             right[a] += row[a] * seen->light[i];
             for (int b = 0; b < EYE_LINEAR; b++)
                 matrix[a * EYE_LINEAR + b] += row[a] * row[b];

@@ -84,22 +84,35 @@ static inline eye_lanes signal_of(const eye_lanes *channels, const eye_task *tas
     return out;
 }
 
+/* Bytes from one column of signal to the next: some rows beyond the last one may be written. */
+static ptrdiff_t column_room(const eye_picture *p) { return (ptrdiff_t)p->rows + EYE_TURNED; }
+
 /* What `fill` does, for EYE_LANES columns of a picture with colour, and for paint that has some. */
 static void fill_lanes(const eye_picture *p, const eye_task *task, int first, int top, int bottom,
                        uint8_t *signal)
 {
-    for (int y = top; y <= bottom; y++) {
-        const uint8_t *at = p->pixels + (ptrdiff_t)y * p->stride + (ptrdiff_t)first * EYE_APART * 3;
-        eye_lanes channels[3];
-        for (int c = 0; c < 3; c++)
-            channels[c] = eye_gather_lanes(at + c);
-        eye_lanes without =
-            eye_lanes_without(channels[task->high], channels[task->low], 4 * EYE_FAINTEST);
-        if (eye_are_all(without))
-            continue;
-        eye_lanes out = signal_of(channels, task) & ~without;
-        for (int lane = 0; lane < EYE_LANES; lane++)
-            signal[(ptrdiff_t)eye_lane_column[lane] * p->rows + y] = out[lane];
+    for (int y = top; y <= bottom; y += EYE_TURNED) {
+        eye_lanes rows[EYE_TURNED] = {{0}};
+        int coloured = 0;
+        for (int k = 0; k < EYE_TURNED && y + k <= bottom; k++) {
+            const uint8_t *at =
+                p->pixels + (ptrdiff_t)(y + k) * p->stride + (ptrdiff_t)first * EYE_APART * 3;
+            /* As in `survey`: two rows of three have not been read yet. */
+            ptrdiff_t ahead = y + k + EYE_TURNED <= bottom ? EYE_TURNED * p->stride : 0;
+            __builtin_prefetch(at + ahead);
+            __builtin_prefetch(at + ahead + LINE);
+            eye_lanes channels[3];
+            for (int c = 0; c < 3; c++)
+                channels[c] = eye_gather_lanes(at + c);
+            eye_lanes without =
+                eye_lanes_without(channels[task->high], channels[task->low], 4 * EYE_FAINTEST);
+            if (eye_are_all(without))
+                continue;
+            rows[k] = signal_of(channels, task) & ~without;
+            coloured = 1;
+        }
+        if (coloured)
+            eye_store_turned(rows, signal + y, column_room(p));
     }
 }
 
@@ -109,7 +122,7 @@ static void fill(const eye_picture *p, const eye_task *task, int first, int coun
                  int bottom, uint8_t *signal)
 {
     int n = p->channels, coloured = eye_is_coloured(n, task);
-    memset(signal, 0, (size_t)p->rows * EYE_LANES);
+    memset(signal, 0, (size_t)column_room(p) * EYE_LANES);
     if (coloured && 3 * (p->columns - EYE_APART * first) >= EYE_SPAN) {
         fill_lanes(p, task, first, top, bottom, signal);
         return;
@@ -119,7 +132,7 @@ static void fill(const eye_picture *p, const eye_task *task, int first, int coun
         for (int c = 0; c < count; c++) {
             const uint8_t *pixel = row + EYE_APART * n * c;
             if (!coloured || eye_colour(pixel, task) > 4 * EYE_FAINTEST)
-                signal[(ptrdiff_t)c * p->rows + y] = (uint8_t)eye_signal(pixel, n, task);
+                signal[c * column_room(p) + y] = (uint8_t)eye_signal(pixel, n, task);
         }
     }
 }
@@ -127,26 +140,29 @@ static void fill(const eye_picture *p, const eye_task *task, int first, int coun
 /* The brightness of a column from the first row with colour to the last one. What has no colour, as
  * black has none, is no brighter than what is between it and colour. */
 static void fill_light(const eye_hits *hits, const uint8_t *signal, int first, int last, int x,
-                       uint8_t *light)
+                       uint8_t *restrict light)
 {
     const eye_picture *p = hits->picture;
-    const uint8_t *pixel = p->pixels + (ptrdiff_t)p->channels * x;
-    int end = -1; /* of what is known */
     memset(light, 0, (size_t)p->rows);
-    for (int y = first; y <= last; y++) {
-        if (signal[y] == 0)
-            continue;
-        int from = y - EYE_BLEEDING > 0 ? y - EYE_BLEEDING : 0;
-        int next = end < 0 ? from : end;
-        int ends = y + EYE_BLEEDING + 1 < p->rows ? y + EYE_BLEEDING + 1 : p->rows;
-        for (int k = next; k < ends; k++)
-            light[k] = (uint8_t)(eye_brightness(pixel + k * p->stride, p->channels, hits->task) / 16);
-        if (next < from) {
-            uint8_t most = light[next - 1] < light[from] ? light[next - 1] : light[from];
-            for (int k = next; k < from; k++)
-                light[k] = light[k] < most ? light[k] : most;
-        }
-        end = ends;
+    while (first <= last && signal[first] == 0)
+        first++;
+    while (last > first && signal[last] == 0)
+        last--;
+    if (first > last)
+        return;
+    int begin = first > EYE_BLEEDING ? first - EYE_BLEEDING : 0;
+    int end = last + EYE_BLEEDING + 1 < p->rows ? last + EYE_BLEEDING + 1 : p->rows;
+    const uint8_t *pixel = p->pixels + begin * p->stride + (ptrdiff_t)p->channels * x;
+    for (int y = begin; y < end; y++, pixel += p->stride)
+        light[y] = (uint8_t)(eye_brightness(pixel, p->channels, hits->task) >> 4);
+    while ((first = eye_end_of_stretch(signal, first, last, 1, 2 * EYE_BLEEDING + 1)) < last) {
+        int from = first + EYE_BLEEDING + 1;
+        while (signal[++first] == 0)
+            ;
+        int to = first - EYE_BLEEDING;
+        uint8_t most = light[from - 1] < light[to] ? light[from - 1] : light[to];
+        for (int k = from; k < to; k++)
+            light[k] = light[k] < most ? light[k] : most;
     }
 }
 
@@ -221,7 +237,7 @@ static void look_at_all(eye_hits *hits, const extent *extents, uint8_t *signal, 
         bottom = bottom + 2 * ROWS_APART < p->rows ? bottom + 2 * ROWS_APART : p->rows - 1;
         fill(p, hits->task, first, c - first, top, bottom, signal);
         for (int k = first; k < c; k++)
-            look_at(hits, signal + (ptrdiff_t)(k - first) * p->rows, top, bottom, EYE_APART * k,
+            look_at(hits, signal + (k - first) * column_room(p), top, bottom, EYE_APART * k,
                     light);
     }
 }
@@ -241,7 +257,7 @@ int eye_search(const eye_picture *picture, const eye_task *task, eye_candidate *
     int n = -1;
     eye_hits *hits = malloc(sizeof *hits);
     extent *extents = malloc(sizeof *extents * columns);
-    uint8_t *signal = malloc((size_t)picture->rows * EYE_LANES), *light = malloc((size_t)picture->rows);
+    uint8_t *signal = malloc((size_t)column_room(picture) * EYE_LANES), *light = malloc((size_t)picture->rows);
     if (hits && extents && signal && light) {
         hits->picture = picture;
         hits->task = task;

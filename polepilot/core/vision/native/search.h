@@ -56,6 +56,19 @@ typedef struct {
     eye_hit hits[EYE_MOST_HITS];
 } eye_hits;
 
+/* The last row of the stretch of signal that begins at row ``from``: ``gap`` rows after it there is no
+ * other one with ``least`` of it. Looked for from the gap's far end, as most rows of a stretch have. */
+static inline int eye_end_of_stretch(const uint8_t *signal, int from, int last, int least, int gap)
+{
+    int end = from;
+    for (int y = from + gap < last ? from + gap : last; y > end; y--)
+        if (signal[y] >= least) {
+            end = y;
+            y = (end + gap < last ? end + gap : last) + 1;
+        }
+    return end;
+}
+
 int eye_find_runs(const uint8_t *signal, int rows, eye_run *runs);
 int eye_smooth_runs(const eye_run *runs, int count, eye_run *smooth);
 void eye_match_runs(eye_hits *hits, const eye_run *runs, int count, float column);

@@ -3,7 +3,6 @@
  * At whole rows first, four places at once, then finer about the best one. */
 #include "lanes.h"
 
-#include <math.h>
 #include <string.h>
 
 #define ROUGH_REST 0.24f /* mean square that a code may leave over at whole rows, of bright - dark, */
@@ -23,17 +22,16 @@
 static int read_levels(const float *sum, int rows, float top, float unit, int segments,
                        float *level)
 {
-    float before = 0;
+    float here[EYE_MOST_SEGMENTS + 1];
+    if (top < 0 || top + unit * (float)segments >= (float)rows)
+        return 0;
     for (int k = 0; k <= segments; k++) {
         float place = top + unit * (float)k;
-        if (place < 0 || place >= (float)rows)
-            return 0;
         int at = (int)place;
-        float here = sum[at] + (place - (float)at) * (sum[at + 1] - sum[at]);
-        if (k > 0)
-            level[k - 1] = (here - before) / unit;
-        before = here;
+        here[k] = sum[at] + (place - (float)at) * (sum[at + 1] - sum[at]);
     }
+    for (int k = 0; k < segments; k++)
+        level[k] = (here[k + 1] - here[k]) / unit;
     return 1;
 }
 
@@ -54,16 +52,19 @@ static void compare(const float *sum, int rows, int bits, eye_slid *out)
     if (step < EYE_LEAST_STEP)
         return;
     out->id = 0;
-    for (int k = 0; k < segments; k++) {
-        int bar = k < 2 || k >= segments - 2, bit = !bar && k % 2 == 1;
-        float off = level[k] - (bar ? bright : dark);
-        if (bit && off > step / 2) {
+    for (int k = 0; k < 2; k++)
+        rest += (level[k] - bright) * (level[k] - bright);
+    for (int k = 2; k < segments - 2; k++) {
+        float off = level[k] - dark;
+        if (k % 2 == 1 && off > step / 2) {
             /* A lone bright segment loses light to its neighbours: as bright as it gets. */
             out->id |= 1 << (k - 3) / 2;
             off = off > LONE * step ? 0 : off - LONE * step;
         }
         rest += off * off;
     }
+    for (int k = segments - 2; k < segments; k++)
+        rest += (level[k] - bright) * (level[k] - bright);
     out->contrast = step;
     out->rest = rest / (step * step * (float)segments);
 }
@@ -77,6 +78,14 @@ static inline quad load(const float *at)
     quad four;
     memcpy(&four, at, sizeof four);
     return four;
+}
+
+static inline quad square(quad values) { return values * values; }
+
+static inline quad lesser(quad one, quad other)
+{
+    quad_mask less = one < other;
+    return (quad)(((quad_mask)one & less) | ((quad_mask)other & ~less));
 }
 
 /* A place of a code: whole rows from where it begins, and a share of the next one. */
@@ -154,18 +163,18 @@ static void sweep(const float *sum, int bits, float unit, int low, int n, eye_sl
         for (int k = 2; k < segments - 2; k += 2)
             dark += level[k] / (float)(bits + 1);
         quad step = bright - dark, lone = LONE * step;
-        for (int k = 0; k < segments; k++) {
-            int bar = k < 2 || k >= segments - 2;
-            quad off = level[k] - (bar ? bright : dark), less = lone - off;
-            off *= off;
-            if (!bar && k % 2 == 1) {
-                less = (quad)((quad_mask)less & (less > 0));
-                less *= less;
-                quad_mask nearer = off < less;
-                off = (quad)(((quad_mask)off & nearer) | ((quad_mask)less & ~nearer));
-            }
-            rest += off;
+        if (eye_are_all((eye_lanes)(step <= EYE_LEAST_STEP)))
+            continue;
+        for (int k = 0; k < 2; k++)
+            rest += square(level[k] - bright);
+        for (int k = 2; k < segments - 3; k += 2) {
+            quad off = level[k + 1] - dark, less = lone - off;
+            rest += square(level[k] - dark);
+            rest += lesser(square(off), square((quad)((quad_mask)less & (less > 0))));
         }
+        rest += square(level[segments - 3] - dark);
+        for (int k = segments - 2; k < segments; k++)
+            rest += square(level[k] - bright);
         quad size = step * step * (float)segments;
         for (int k = 0; k < FOUR && i + k < n; k++)
             if (step[k] > EYE_LEAST_STEP && rest[k] < best->rest * size[k]) {
@@ -201,9 +210,10 @@ int eye_slide(const float *sum, int rows, int bits, float least, float most, int
     float segments = (float)(2 * bits + 5);
     *best = (eye_slid){.rest = ROUGH_REST};
     least = least < EYE_SHORTEST ? EYE_SHORTEST : least;
-    for (float unit = least; unit <= most; unit += fmaxf(1, COARSE * unit) / segments) {
+    for (float unit = least; unit <= most;
+         unit += (COARSE * unit > 1 ? COARSE * unit : 1) / segments) {
         float length = segments * unit;
-        int low = (int)ceilf((float)(end - EYE_BLEEDING) - length), high = from + EYE_BLEEDING;
+        int low = eye_ceil((float)(end - EYE_BLEEDING) - length), high = from + EYE_BLEEDING;
         low = low < 0 ? 0 : low;
         high = high > rows - 2 - (int)length ? rows - 2 - (int)length : high;
         int n = high - low + 1;

@@ -137,7 +137,7 @@ static void level_out(float *values, int n)
 
 /* Bright minus dark by column, each band moved back by ``lean``. */
 static void difference(const band *bands, int n, int columns, int step, double row, double lean,
-                       int light, int sharp, float *out)
+                       int light, int sharp, float *restrict out)
 {
     memset(out, 0, sizeof *out * (size_t)columns);
     for (int b = 0; b < n; b++) {

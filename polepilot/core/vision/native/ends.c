@@ -1,10 +1,11 @@
 /* Whether the end bars are there, and end.
  *
- * A striped post before something of the paint's colour shows dark stripes and bright gaps, and what
- * is behind it may pass for end bars. Two stories are told of a bar whose end is not to be seen: it
- * is the paint of the bright bits, shaded across as they are; or it is what lies beside it or beyond.
- * How much less the second one leaves over is the doubt. And a bar has an end: where what is beyond
- * is like the bar, but not like what is beside it, a post goes on, and its stripes are no code. */
+ * No bit is as long as an end bar. A striped post begins and ends with one stripe, and with what is
+ * behind it for the other half that passes for an end bar; behind the gaps of a post for both halves. So
+ * two stories are told of a bar's outer half: it is the paint of its inner half and of the bright
+ * bits, shaded across as they are; or it is what lies beside it or beyond. How much less the second
+ * one leaves over is the doubt. And a bar has an end: where what is beyond is like it, but not like
+ * what is beside it, a post goes on, and its stripes are no code. */
 #include "internal.h"
 
 #include <math.h>
@@ -13,16 +14,15 @@
 #define SAMPLES_A_COLUMN 0.85
 #define LOOKED_AT 0.8      /* share of the half width */
 #define MOST_ROWS 4        /* of a stretch along the strip that are averaged */
-#define TRIM 0.3           /* segments: blurred ends that are left out, */
-#define BIT_TRIM 0.25      /* of a bit */
-#define THIN_TRIM 0.4      /* and of one that has hardly two rows */
+#define TRIM 0.25          /* segments: blurred ends of one that are left out, */
+#define THIN_TRIM 0.4      /* and of a bit that has hardly two rows */
 #define THIN 2.0           /* rows */
 #define NEAR_END 0.3       /* segments from a bar's end to what is beyond it, */
 #define NEAR_ROWS 0.8      /* rows besides where segments are short */
 #define BEYOND 0.4         /* segments of that */
 #define GAIN 0.15          /* by which light may change from the bits to an end bar */
 #define FLOOR 0.0016       /* rest, of the square of bright - dark, that says nothing */
-#define MOST_GROUND 0.04   /* more of it, and it is another story still */
+#define FREE 4.0           /* numbers in a segment's light, noise being alike in neighbours */
 #define ALIKE 0.02         /* rest of one thing that goes on */
 #define STANDS_OUT 12.0    /* times more than that: something else */
 
@@ -112,7 +112,7 @@ static double rest_of_beside(const view *v, double from, double to, const across
 static double look_at_bits(const view *v, const char *code, int segments, const double *dark,
                            across *bits)
 {
-    double trim = v->scale->unit > THIN ? BIT_TRIM : THIN_TRIM, sum = 0;
+    double trim = v->scale->unit > THIN ? TRIM : THIN_TRIM, sum = 0;
     int ones = 0, channels = v->picture->channels;
     *bits = (across){{{0}}};
     for (int i = 3; i < segments - 3; i += 2) {
@@ -145,37 +145,47 @@ static double gain_of(const view *v, const across *one, const across *other)
     return eye_limit(product / power, 1 - GAIN, 1 + GAIN);
 }
 
+/* Light of the segment that begins at a place and lies above (-1) or below (1) it, without its blurred
+ * ends; 0 where the picture does not show it. */
+static int look_at_segment(const view *v, double begin, int way, double *from, double *to,
+                           across *out)
+{
+    *from = fmin(begin, begin + way) + TRIM;
+    *to = fmax(begin, begin + way) - TRIM;
+    return look(v, *from, *to, v->offset, v->n, out);
+}
+
 /* Looks at the end bar above (-1) or below (1); the reason where it does not end. ``contrast``: mean
  * square of bright - dark. */
 static int look_at_bar(const view *v, const across *bits, double contrast, double half_code,
                        int way, double *doubt)
 {
-    double outer = way * half_code, inner = way * (half_code - 2);
-    double bar_from = fmin(outer, inner) + TRIM, bar_to = fmax(outer, inner) - TRIM;
-    double begin = NEAR_END > NEAR_ROWS / v->scale->unit ? NEAR_END : NEAR_ROWS / v->scale->unit;
+    double outer = way * half_code, begin = fmax(NEAR_END, NEAR_ROWS / v->scale->unit);
     double near = outer + way * begin, far = near + way * BEYOND;
-    double from = fmin(near, far), to = fmax(near, far);
-    across bar, beyond;
-    if (!look(v, bar_from, bar_to, v->offset, v->n, &bar))
+    double from, to, inner_from, inner_to;
+    across bar, inner, beyond;
+    if (!look_at_segment(v, outer - 2 * way, way, &inner_from, &inner_to, &inner) ||
+        !look_at_segment(v, outer - way, way, &from, &to, &bar))
         return EYE_READ;
-    double paint = rest_of(v, &bar, bits, gain_of(v, &bar, bits)) / contrast;
-    double ground = rest_of_beside(v, bar_from, bar_to, &bar) / contrast;
+    double paint = (rest_of(v, &bar, bits, gain_of(v, &bar, bits)) +
+                    rest_of(v, &bar, &inner, gain_of(v, &bar, &inner))) / (2 * contrast);
+    double ground = rest_of_beside(v, from, to, &bar) / contrast;
+    from = fmin(near, far);
+    to = fmax(near, far);
     if (eye_row_at(v->scale, from) >= 0 && eye_row_at(v->scale, to) <= v->picture->rows - 1 &&
         look(v, from, to, v->offset, v->n, &beyond)) {
-        double alike = rest_of(v, &beyond, &bar, 1) / contrast;
+        double alike = rest_of(v, &beyond, &inner, 1) / contrast;
         double beside = rest_of_beside(v, from, to, &beyond) / contrast;
         if (alike < ALIKE && beside > STANDS_OUT * (alike + FLOOR / 4))
             return EYE_GOES_ON;
-        ground = fmin(ground, alike);
+        ground = fmin(ground, rest_of(v, &beyond, &bar, 1) / contrast);
     }
-    /* Where neither story is true the bits say little of the paint: thin, or blurred by JPEG. */
-    if (ground < MOST_GROUND)
-        *doubt = fmax(*doubt, (paint + FLOOR) / (ground + FLOOR));
+    *doubt += FREE * fmax(log((paint + FLOOR) / (ground + FLOOR)), 0);
     return EYE_READ;
 }
 
-/* Looks at both end bars; the reason where one goes on. ``doubt``: how
- * much more a bar leaves over as paint than as what is behind it. */
+/* Looks at both end bars; the reason where one goes on. ``doubt``: how much likelier what is behind them
+ * is than paint, twice the logarithm: it adds up with squares of normal errors. */
 int eye_look_at_ends(const eye_picture *p, const eye_upright *u, const eye_scale *scale,
                      const eye_side *side, const char *code, double levels[][EYE_LIGHTS],
                      int segments, double *doubt)

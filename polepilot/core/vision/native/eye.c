@@ -18,7 +18,6 @@
 #define USUAL_TINT 0.17        /* as in eye_strip, */
 #define USUAL_SHARP_TINT 0.28  /* and where colour is blurred: beside the strip and between its segments */
 #define USUAL_SIGMA 0.0040      /* of the unit, as a share of it */
-#define USUAL_DOUBT 0.35        /* rest of an end bar as paint, over its rest as what is behind it */
 #define LEAST_APART 1.4         /* of bright - dark, from what is beside it: what is missing is a */
 #define USUAL_APART 0.3         /* misfit, in this, */
 #define MISFIT_APART 3.0        /* and what is more makes up for so much of one, */
@@ -207,11 +206,7 @@ static int examine(const eye_picture *picture, const eye_task *task,
     /* A nearer landmark's segments may have the proportions of these: the width has to tell. */
     if ((seen.first > 2 || seen.end < segments - 2) && !shows_sides(picture, &upright, &side))
         return EYE_CUT_OFF;
-    /* Pale far bars may be as bright as what is beside them: where colour is of no use, only those are
-     * asked whose ends are not to be seen. */
-    if (!sharp || candidate->open_top || candidate->open_bottom)
-        reason = eye_look_at_ends(picture, &upright, &scale, &side, out->code, levels, segments,
-                                  &doubt);
+    reason = eye_look_at_ends(picture, &upright, &scale, &side, out->code, levels, segments, &doubt);
     if (reason != EYE_READ)
         return reason;
     if (eye_in_front(picture, task, &upright, &scale, &side, out->code, levels, segments, &seen))
@@ -237,14 +232,13 @@ static int examine(const eye_picture *picture, const eye_task *task,
     out->unit_sigma = hypot(scale.unit_sigma, scale.unit_doubt);
     out->sag_sigma = hypot(scale.sag_sigma, scale.sag_doubt);
     /* Half of the squares are the logarithm by which normal errors make a strip less likely. */
-    if (candidate->settled && apart >= USUAL_APART && bad / 2 <= candidate->odds) {
+    if (candidate->settled && apart >= USUAL_APART && (bad + doubt) / 2 <= candidate->odds) {
         out->tint = fmax(out->tint, 0);
         return EYE_READ;
     }
     if (!(bad <= most) || out->tint == UNREAD) /* or no number */
         return EYE_POOR_FIT;
-    doubt /= USUAL_DOUBT;
-    return bad + doubt * doubt > most ? EYE_NO_BAR : EYE_READ;
+    return bad + doubt > most ? EYE_NO_BAR : EYE_READ;
 }
 
 /* Whether a candidate that failed in colour gets a second chance: a far one whose colour is blurred, or one

@@ -238,7 +238,7 @@ static int examine(const eye_picture *picture, const eye_task *task,
     }
     if (!(bad <= most) || out->tint == UNREAD) /* or no number */
         return EYE_POOR_FIT;
-    return bad + doubt > most ? EYE_NO_BAR : EYE_READ;
+    return bad + doubt <= most ? EYE_READ : EYE_NO_BAR;
 }
 
 /* Whether a candidate that failed in colour gets a second chance: a far one whose colour is blurred, or one

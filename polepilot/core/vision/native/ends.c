@@ -164,11 +164,15 @@ static int look_at_bar(const view *v, const across *bits, double contrast, doubl
     double near = outer + way * begin, far = near + way * BEYOND;
     double from, to, inner_from, inner_to;
     across bar, inner, beyond;
-    if (!look_at_segment(v, outer - 2 * way, way, &inner_from, &inner_to, &inner) ||
-        !look_at_segment(v, outer - way, way, &from, &to, &bar))
+    if (!look_at_segment(v, outer - 2 * way, way, &inner_from, &inner_to, &inner))
         return EYE_READ;
-    double paint = (rest_of(v, &bar, bits, gain_of(v, &bar, bits)) +
-                    rest_of(v, &bar, &inner, gain_of(v, &bar, &inner))) / (2 * contrast);
+    if (!look_at_segment(v, outer - way, way, &from, &to, &bar)) { /* the picture cuts it off */
+        bar = inner;
+        from = inner_from;
+        to = inner_to;
+    }
+    double paint = fmax(rest_of(v, &bar, bits, gain_of(v, &bar, bits)),
+                        rest_of(v, &bar, &inner, gain_of(v, &bar, &inner))) / contrast;
     double ground = rest_of_beside(v, from, to, &bar) / contrast;
     from = fmin(near, far);
     to = fmax(near, far);

@@ -103,7 +103,7 @@ static int read_strip(const eye_task *task, const eye_candidate *candidate,
                       eye_strip *out)
 {
     int segments = 2 * candidate->bits + 5, wanted = *id;
-    char code[EYE_CODE_SIZE];
+    char code[EYE_CODE_SIZE] = {0};
     eye_encode(wanted, candidate->bits, code);
     int reason = eye_fit_scale(upright, task, code, candidate, sharp, scale);
     if (reason != EYE_READ)
@@ -238,7 +238,8 @@ static int examine(const eye_picture *picture, const eye_task *task,
     }
     if (!(bad <= most) || out->tint == UNREAD) /* or no number */
         return EYE_POOR_FIT;
-    return bad + doubt <= most ? EYE_READ : EYE_NO_BAR;
+    /* What makes it the likelier a code says nothing of its bars. */
+    return bad + doubt <= most && doubt <= MOST_MISFIT ? EYE_READ : EYE_NO_BAR;
 }
 
 /* Whether a candidate that failed in colour gets a second chance: a far one whose colour is blurred, or one

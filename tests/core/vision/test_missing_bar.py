@@ -1,0 +1,56 @@
+"""Striped posts that lack an end bar, before a wall of about the paint's colour."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from vision_scenes import CAMERA
+
+from polepilot.core.landmark import LandmarkKind, encode
+from polepilot.core.observation import Image
+from polepilot.core.vision.detector import LandmarkDetector
+from polepilot.core.vision.paint import ORANGE
+
+KINDS = dict.fromkeys(range(1, 16), LandmarkKind())
+FINE = 4
+"""Pixels that are drawn for one of the picture, each way."""
+SEGMENTS = 13
+
+
+def post(rng: np.random.Generator) -> tuple[Image, float, float]:
+    """A picture, the row in which the code begins, and the rows of a segment."""
+    away = float(rng.uniform(3.0, 9.0))
+    unit = CAMERA.constant * 0.05 / away
+    paint = (np.array(ORANGE.bgr) / 255) ** 2.2 * rng.uniform(0.5, 1)
+    wall = paint * np.array([rng.uniform(0.7, 1.6), rng.uniform(0.7, 1.4), rng.uniform(0.7, 1.1)])
+    drawn = np.full((CAMERA.height * FINE, CAMERA.width * FINE, 3), rng.uniform(0.05, 0.5))
+    bottom = CAMERA.center_y + CAMERA.constant / away * 0.4
+    top = bottom - SEGMENTS * unit
+    drawn[int(max(top - 3 * unit, 0)) * FINE : int((top + 3 * unit) * FINE), 600:1000] = wall
+    across = (np.arange(drawn.shape[1]) + 0.5 - 800) / (0.7 * unit * FINE)
+    on = np.abs(across) < 1
+    shade = 0.45 + 0.55 * np.sqrt(1 - across[on] ** 2)
+    code = encode(int(rng.integers(1, 16)), 4)
+    for k in range(2, SEGMENTS):
+        rows = slice(round((top + k * unit) * FINE), round((top + (k + 1) * unit) * FINE))
+        drawn[rows, on] = (paint if code[k] == "1" else np.full(3, 0.006)) * shade[:, None]
+    blurred = cv2.GaussianBlur(drawn, (0, 0), FINE * rng.uniform(0.3, 0.6))
+    small = cv2.resize(blurred, None, fx=1 / FINE, fy=1 / FINE, interpolation=cv2.INTER_AREA)
+    light = 255 * small ** (1 / 2.2) + rng.normal(0, 1.5, small.shape)
+    return np.clip(light, 0, 255).astype(np.uint8), top, unit
+
+
+@pytest.mark.parametrize("shown", [2.0, 1.1, 0.9])
+def test_a_wall_is_no_end_bar(shown: float) -> None:
+    """``shown``: segments of what passes for the upper bar that the picture leaves."""
+    rng = np.random.default_rng(20)
+    read = 0
+    for _ in range(60):
+        image, top, unit = post(rng)
+        cut = max(round(top + (2 - shown) * unit), 0) if shown < 2 else 0
+        camera = replace(CAMERA, height=CAMERA.height - cut, center_y=CAMERA.center_y - cut)
+        read += bool(LandmarkDetector(camera, KINDS).detect(np.ascontiguousarray(image[cut:])))
+    assert read <= 3

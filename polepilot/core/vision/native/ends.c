@@ -2,10 +2,10 @@
  *
  * No bit is as long as an end bar. A striped post begins and ends with one stripe, and with what is
  * behind it for the other half that passes for an end bar; behind the gaps of a post for both halves. So
- * two stories are told of a bar's outer half: it is the paint of its inner half and of the bright
- * bits, shaded across as they are; or it is what lies beside it or beyond. How much less the second
- * one leaves over is the doubt. And a bar has an end: where what is beyond is like it, but not like
- * what is beside it, a post goes on, and its stripes are no code. */
+ * two stories are told of a bar's outer half (where the picture cuts that off, of the inner one): it is the
+ * paint of its inner half and of the bright bits, shaded across as they are; or it is what lies beside it
+ * or beyond. How much less the second one leaves over is the doubt. And a bar has an end: where what is
+ * beyond is like it, but not like what is beside it, a post goes on, and its stripes are no code. */
 #include "internal.h"
 
 #include <math.h>
@@ -184,7 +184,8 @@ static int look_at_bar(const view *v, const across *bits, double contrast, doubl
             return EYE_GOES_ON;
         ground = fmin(ground, rest_of(v, &beyond, &bar, 1) / contrast);
     }
-    *doubt += FREE * fmax(log((paint + FLOOR) / (ground + FLOOR)), 0);
+    double likelier = log((paint + FLOOR) / (ground + FLOOR));
+    *doubt += likelier <= 0 ? 0 : FREE * likelier; /* no number stays none, and is refused */
     return EYE_READ;
 }
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import http.client
+import json
 import math
 import os
 import signal
@@ -255,11 +257,13 @@ def test_a_plan_that_nobody_waits_for_is_given_up(serve: Callable[..., Running])
             raise
 
     running.services.planner.plan = endless  # type: ignore[method-assign]
-    body = {"site_id": 1, "mode": "scan"}
-    with httpx.Client() as client, pytest.raises(httpx.ReadTimeout):
-        client.post(f"{running.url}{API}/plans", json=body, timeout=0.5)
-    assert began.is_set()
-    assert given_up.wait(3)
+    body = json.dumps({"site_id": 1, "mode": "scan"})
+    # Whoever asks leaves once the plan has begun, however long that took on a busy machine.
+    client = http.client.HTTPConnection(*running.url.removeprefix("http://").split(":"), timeout=60)
+    client.request("POST", f"{API}/plans", body, {"Content-Type": "application/json"})
+    assert began.wait(30)
+    client.close()
+    assert given_up.wait(30)
 
 
 def test_the_end_of_the_service_is_an_answer_to_who_waits_for_a_plan(

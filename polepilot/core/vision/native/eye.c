@@ -12,6 +12,8 @@
 #define MISFIT_A_BIT 7.0       /* with every further bright bit the more: the more there is to fit, */
 #define MISFIT_A_LAST_BIT 3.0  /* but less if all are bright: many things are evenly striped */
 #define USUAL_NOISE 0.035      /* rms rest of the fit of the edges, of bright - dark */
+#define MOST_NOISE 0.1         /* and the most that anything makes up for, */
+#define IN_PLACE 4.0           /* from so many rows per segment on */
 #define USUAL_SIDE_NOISE 0.08  /* rms rest of the fit across, of its peak */
 #define USUAL_PITCH 0.035      /* radians between camera and pole */
 #define USUAL_BEND 2.1          /* times what the sag's sigma and that pitch allow */
@@ -192,6 +194,9 @@ static int examine(const eye_picture *picture, const eye_task *task,
     if (reason != EYE_READ)
         return reason;
     if (scale.unit < SHORTEST || scale.blur > MOST_BLUR + 0.3 * scale.unit)
+        return EYE_POOR_FIT;
+    /* Bright bits are evidence, but where segments have rows enough their edges are in place. */
+    if (scale.unit > IN_PLACE && scale.noise > MOST_NOISE)
         return EYE_POOR_FIT;
     const eye_kind *kind = task->kinds + out->id;
     if (kind->bits != candidate->bits)

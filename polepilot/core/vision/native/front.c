@@ -12,11 +12,11 @@
 #include <string.h>
 
 #define ENOUGH 1.85     /* evidence; a piece is hardly ever more than 1 without a cover, */
-#define MOST_OF_ONE 1.5 /* and counts no more than this; but for the one that is */
+#define MOST_OF_ONE 1.25 /* and counts no more than this; but for the one that is */
 #define CERTAIN 2.85    /* by itself, whatever else there is */
 #define LEAST_ROWS 3.5  /* of a cover with fewer only what is certain counts */
-#define MIDST_WIDE 0.5  /* half of the midst of a bit: of the strip's, */
-#define MIDST_HIGH 0.25 /* segments; blur leaves it alone */
+#define MIDST_WIDE 0.4  /* half of the midst of a bit: of the strip's, */
+#define MIDST_HIGH 0.3  /* segments; blur leaves it alone */
 #define MOST_SEEN 8     /* rows and columns of it that are looked at, at the most */
 #define MOST_ROWS 512   /* of what is beside a side, */
 #define ROWS_A_UNIT 5.0 /* and how many a segment if there are many more */
@@ -25,7 +25,7 @@
 #define TILT 0.2        /* by so many more segments up or down each */
 #define LEVEL_TILTS 1   /* of them what is seen at one side only may have */
 #define SAME_BOTH 0.015 /* of bright - dark: how much one thing may differ on the pole and beside; or */
-#define SAME_SHARE 0.06 /* of how much it stands out, as far as that is no more than bright - dark */
+#define SAME_SHARE 0.05 /* of how much it stands out, as far as that is no more than bright - dark */
 #define SAME_ONE 0.02
 #define SAME_NOISE 0.2  /* times the fit's rest, more; */
 #define UNLIKE 5.0      /* times as much of SAME_ONE says nothing any more */
@@ -33,7 +33,7 @@
 #define STANDS_OUT_LEAST 0.08 /* what stands out by less than that, but by so much, takes SAME_SHARE */
 #define STANDS_OUT_ONE 0.5 /* and at one side so that nothing is missing */
 #define OTHER_BLACK 0.04   /* of bright - dark, and times the spread of the other dark segments: */
-#define OTHER_SPREAD 3.0
+#define OTHER_SPREAD 2.0
 #define OTHER_PAINT 0.25   /* of bright - dark; gloss and shade differ by less */
 #define LIKE_PAINT 0.4     /* evidence of that below which it is the bars' paint */
 #define SWELLS 0.45        /* columns by which a side stands out, and times as much elsewhere: */
@@ -210,21 +210,26 @@ static double goes_on(const scene *s, const block *over)
     return at_most(most);
 }
 
-/* Whether their black is another one than that of the other dark segments: evidence. Of colour
- * the middle channel is asked, which every camera and JPEG keep best. */
+/* Whether their black is another one than that of the other dark segments: evidence. All channels
+ * count alike: one thing differs in colour, another one in how light it is. */
 static double other_black(const scene *s, const block *over)
 {
-    double values[EYE_MOST_SEGMENTS];
-    int n = 0, channel = s->channels == 3 ? 1 : 0;
-    for (int k = 2; k < s->segments - 2; k++)
-        if (s->code[k] == '0' && (k < over->first - 1 || k > over->last + 1))
-            values[n++] = s->levels[k][channel];
-    if (n < 3)
-        return 0;
-    double middle = eye_median(values, n);
-    double spread = fmax(values[n - 1] - middle, middle - values[0]) / s->contrast;
-    double off = fabs(over->level[channel] - middle) / s->contrast;
-    return at_most(off / (OTHER_BLACK + OTHER_SPREAD * spread));
+    double squares = 0;
+    for (int c = 0; c < s->channels; c++) {
+        double values[EYE_MOST_SEGMENTS];
+        int n = 0;
+        for (int k = 2; k < s->segments - 2; k++)
+            if (s->code[k] == '0' && (k < over->first - 1 || k > over->last + 1))
+                values[n++] = s->levels[k][c];
+        if (n < 3)
+            return 0;
+        double middle = eye_median(values, n);
+        double spread = fmax(values[n - 1] - middle, middle - values[0]) / s->contrast;
+        double off = fabs(over->level[c] - middle) / s->contrast;
+        double much = off / (OTHER_BLACK + OTHER_SPREAD * spread);
+        squares += much * much;
+    }
+    return at_most(sqrt(squares / s->channels));
 }
 
 /* Whether a bright bit's paint is another one than that of the end bars: evidence. */

@@ -122,8 +122,10 @@ class LandmarkDetector:
         return _Reading(strip, ideal, kind)
 
     def _stands(self, one: _Reading) -> bool:
-        cut = is_cut(one.seen, one.kind, self._camera)
-        return stands(one.ideal, one.kind, self._camera, cut)
+        kind, camera = one.kind, self._camera
+        if stands(one.ideal, kind, camera, cut=True):  # nearly all: on the floor, cut or not
+            return True
+        return stands(one.ideal, kind, camera) and not is_cut(one.seen, kind, camera)
 
     def _measured(self, best: Sequence[_Reading]) -> list[Detection]:
         if not best:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+import struct
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -45,16 +46,6 @@ REASONS = (
     "it goes on beyond its end",
 )
 """What `Strip.reason` means, in words; the first is a strip that was read."""
-
-
-class _Picture(ctypes.Structure):
-    _fields_ = [
-        ("pixels", ctypes.c_void_p),
-        ("rows", ctypes.c_int32),
-        ("columns", ctypes.c_int32),
-        ("channels", ctypes.c_int32),
-        ("stride", ctypes.c_ssize_t),
-    ]
 
 
 class _Kind(ctypes.Structure):
@@ -139,6 +130,8 @@ class Strip(ctypes.Structure):
 
 
 _Strips = Strip * MOST_STRIPS
+_PICTURE = struct.Struct("P3in")
+"""``eye_picture``: where its first pixel is, rows, columns, channels and stride."""
 
 
 class Kernel:
@@ -192,30 +185,17 @@ class Kernel:
                 f"a picture of {image.dtype}, {shape}: expected uint8, rows x columns x 3, "
                 "or rows x columns."
             )
-        if _is_grey(image):
-            image = image[:, :, 0]
         channels = image.shape[2] if image.ndim == 3 else 1
         strides = image.strides
         if strides[-1] != 1 or strides[1] != channels:
             image = np.ascontiguousarray(image)
             strides = image.strides
-        picture = _Picture(_address_of(image), shape[0], shape[1], channels, strides[0])
+        picture = _PICTURE.pack(_address_of(image), shape[0], shape[1], channels, strides[0])
         strips = _Strips()
-        count = self._look(ctypes.byref(picture), self._task_at, strips, MOST_STRIPS)
+        count = self._look(picture, self._task_at, strips, MOST_STRIPS)
         if count < 0:
             raise MemoryError("no memory to look at a picture")
         return strips[:count]
-
-
-def _is_grey(image: Image) -> bool:
-    """Whether three channels say the same everywhere, as a monochrome camera's often do."""
-    if image.shape[2:] != (3,) or not image.size:
-        return False
-    row = image[image.shape[0] // 2, ::8]  # settles it for pictures with colour, at no cost
-    if row[:, 0].tobytes() != row[:, 2].tobytes():
-        return False
-    blue, green, red = image[:, :, 0], image[:, :, 1], image[:, :, 2]
-    return np.array_equal(blue, green) and np.array_equal(blue, red)
 
 
 def _address_of(image: Image) -> int:

@@ -106,17 +106,17 @@ def pitch_of(strips: Sequence[tuple[Strip, LandmarkKind]], camera: Camera) -> Pi
     for strip, kind in strips:
         # sag = -segment sin(pitch) / depth, and depth = C segment / unit.
         by_pixels = constant / strip.unit
-        sigma = math.hypot(strip.sag_sigma * by_pixels, TILT)
-        if sigma < 10 * PITCH_PRIOR:
-            total += -strip.sag * by_pixels / sigma**2
-            weight += 1 / sigma**2
+        variance = (strip.sag_sigma * by_pixels) ** 2 + TILT**2
+        if variance < (10 * PITCH_PRIOR) ** 2:
+            total -= strip.sag * by_pixels / variance
+            weight += 1 / variance
         depth = by_pixels * kind.segment
         seen = math.atan2(camera.center_y - strip.row, constant)
         standing = math.atan2(kind.height / 2 - camera.mount_height, depth)
         if abs(standing - seen) < MOST_PITCH:
-            sigma = math.hypot(FOOT_SIGMA / depth, 0.002)
-            total += (standing - seen) / sigma**2
-            weight += 1 / sigma**2
+            variance = (FOOT_SIGMA / depth) ** 2 + 0.002**2
+            total += (standing - seen) / variance
+            weight += 1 / variance
     return Pitch(total / weight, 1 / math.sqrt(weight))
 
 

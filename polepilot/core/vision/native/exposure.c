@@ -1,4 +1,4 @@
-/* A picture taken in the dark is made brighter before it is looked at. */
+/* A picture is made what it is looked at as: without colour if it has none, brighter if it is dark. */
 #include "internal.h"
 
 #include <math.h>
@@ -8,6 +8,36 @@
 #define FEW 200         /* of which one in so many may be brighter: a lamp */
 #define BRIGHT 80       /* grey levels that others should reach */
 #define MOST_TIMES 4.0  /* what there is in the dark is mostly noise */
+
+/* Whether three channels say the same everywhere, as a monochrome camera's often do. */
+static int is_grey(const eye_picture *p)
+{
+    if (p->channels != 3)
+        return 0;
+    for (int y = 0; y < p->rows; y++) {
+        const uint8_t *pixel = p->pixels + (ptrdiff_t)y * p->stride;
+        for (int x = 0; x < p->columns; x++, pixel += 3)
+            if (pixel[0] != pixel[1] || pixel[0] != pixel[2])
+                return 0;
+    }
+    return 1;
+}
+
+/* Makes a copy with one channel of a picture the three of which say the same: 1, and its pixels have
+ * to be freed. 0 if they do not, -1 where there is no memory. */
+int eye_make_grey(const eye_picture *p, eye_picture *out)
+{
+    if (!is_grey(p))
+        return 0;
+    uint8_t *pixels = malloc((size_t)p->columns * (size_t)p->rows);
+    if (!pixels)
+        return -1;
+    *out = (eye_picture){pixels, p->rows, p->columns, 1, p->columns};
+    for (int y = 0; y < p->rows; y++)
+        for (int x = 0; x < p->columns; x++)
+            *pixels++ = p->pixels[(ptrdiff_t)y * p->stride + 3 * (ptrdiff_t)x];
+    return 1;
+}
 
 /* The level, in the paint's brightest channel, that few pixels exceed; BRIGHT if it is that or more. */
 static int brightest(const eye_picture *p, const eye_task *task)

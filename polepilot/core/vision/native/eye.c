@@ -317,14 +317,18 @@ static int look(const eye_picture *picture, const eye_task *task, eye_strip *str
 int32_t eye_look(const eye_picture *picture, const eye_task *task, eye_strip *strips,
                  int32_t capacity)
 {
-    eye_picture brighter;
+    eye_picture grey, brighter;
     if (picture->rows < LEAST_ROWS || picture->columns < 1 || capacity < 1)
         return 0;
-    int dim = eye_brighten(picture, task, &brighter);
-    if (dim < 0)
+    int plain = eye_make_grey(picture, &grey);
+    if (plain < 0)
         return -1;
-    int looked = look(dim ? &brighter : picture, task, strips, capacity);
-    if (dim)
+    const eye_picture *seen = plain ? &grey : picture;
+    int dim = eye_brighten(seen, task, &brighter);
+    int looked = dim < 0 ? -1 : look(dim ? &brighter : seen, task, strips, capacity);
+    if (dim > 0)
         free((void *)brighter.pixels);
+    if (plain)
+        free((void *)grey.pixels);
     return looked;
 }

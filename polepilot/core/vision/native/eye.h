@@ -2,7 +2,7 @@
  *
  * One call looks at one picture and keeps nothing; any number of threads may call at the same time.
  * The steps, in their order, are one file each:
- *   exposure.c a dim picture made brighter
+ *   exposure.c a grey picture made one of one channel, a dim one made brighter
  *   search.c   which columns to look at (sixteen at once: lanes.h), with
  *     runs.c     the bright runs of a column
  *     match.c    runs with the proportions of a code: near landmarks

@@ -69,6 +69,7 @@ typedef struct {
 } eye_side;
 
 /* Each says in its file what it does; those that return a reason return one of enum eye_reason. */
+int eye_make_grey(const eye_picture *picture, eye_picture *out);
 int eye_brighten(const eye_picture *picture, const eye_task *task, eye_picture *out);
 int eye_search(const eye_picture *picture, const eye_task *task, eye_candidate *found);
 int eye_straighten(const eye_picture *picture, const eye_task *task,

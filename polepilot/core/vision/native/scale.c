@@ -64,18 +64,17 @@ static inline void add_line(double *line, const double *row, double scaled, int 
 static void add_row(double *normal, double *right, const double *row, int shows, double rest,
                     double weight)
 {
-    enum { FEW = (EYE_LINEAR + 1) / 2 * 2 };
     for (int a = 0; a < EYE_LINEAR; a++) {
         if (row[a] == 0)
             continue;
         double scaled = row[a] * weight;
         right[a] += scaled * rest;
-        add_line(normal + a * EYE_PARAMETERS, row, scaled, FEW);
+        add_line(normal + a * EYE_PARAMETERS, row, scaled, (a + 2) / 2 * 2);
     }
     for (int a = EYE_LINEAR; shows && a < EYE_PARAMETERS; a++) {
         double scaled = row[a] * weight;
         right[a] += scaled * rest;
-        add_line(normal + a * EYE_PARAMETERS, row, scaled, EYE_PARAMETERS);
+        add_line(normal + a * EYE_PARAMETERS, row, scaled, (a + 2) / 2 * 2);
     }
 }
 

@@ -12,7 +12,6 @@
 #define FEWEST_CELLS 8 /* strips of the surface in the model, */
 #define MOST_CELLS 32  /* each about a column wide: finer than the blur, */
 #define FINE_CELLS 24 /* and for its mean height */
-#define SHOWS 5.0     /* times the blur: light does not reach farther */
 #define ROUNDS 6
 #define SETTLED 0.04    /* columns by which the middle still moves when a fit may end */
 #define MARGIN 3.0    /* columns that take part beside a strip a quarter wider than expected */
@@ -62,40 +61,50 @@ static void divide(surface *out, int cells)
     }
 }
 
-/* One column of the model: basis of the levels and derivatives; returns the prediction. */
-static double model_column(double x, double size, const double *guess, const surface *of, int flat,
-                           double *row)
+/* What the normal distribution about each strip of the surface is at one place: how far off that is,
+ * of the blur, and its cumulative function and density there. */
+typedef struct {
+    double off[MOST_CELLS], below[MOST_CELLS], bell[MOST_CELLS];
+} border;
+
+static void look_at_border(double x, const double *guess, const surface *of, border *out)
+{
+    double sharp = 1 / guess[BLUR];
+    for (int i = 0; i < of->cells; i++) {
+        double z = (x - guess[MIDDLE] - guess[HALF] * of->place[i]) * sharp;
+        out->off[i] = z;
+        eye_normal(z, out->below + i, out->bell + i);
+    }
+}
+
+/* One column of the model, between two borders: basis of the levels and derivatives; returns the
+ * prediction. */
+static double model_column(const border *left, const border *right, double size,
+                           const double *guess, const surface *of, int flat, double *row)
 {
     int cells = of->cells;
-    double middle = guess[MIDDLE], sharp = 1 / guess[BLUR], half = guess[HALF];
-    double weight = 2 * half / (cells * size);
-    memset(row, 0, sizeof(double) * PARAMETERS);
-    double by_middle = 0, by_blur = 0, by_half = 0, sum = 0;
+    double sharp = 1 / guess[BLUR], half = guess[HALF], bulge = flat ? 0 : guess[BULGE];
+    double weight = 2 * half / (cells * size), over = 1 / half;
+    double by_level = 0, by_slope = 0, by_bulge = 0, by_middle = 0, by_blur = 0, by_half = 0, sum = 0;
     for (int i = 0; i < cells; i++) {
-        double u = of->place[i], place = middle + half * u;
-        double z0 = (x - size / 2 - place) * sharp, z1 = (x + size / 2 - place) * sharp;
-        if (z1 < -SHOWS || z0 > SHOWS)
-            continue;
-        double c0, c1, b0, b1;
-        eye_normal(z0, &c0, &b0);
-        eye_normal(z1, &c1, &b1);
-        double kernel = (c1 - c0) * weight;
-        double rise = of->rise[i];
-        double level = guess[LEVEL] + guess[SLOPE] * u + (flat ? 0 : guess[BULGE] * rise);
-        double by_place = (b0 - b1) * weight * sharp;
-        row[LEVEL] += kernel;
-        row[SLOPE] += kernel * u;
-        if (!flat)
-            row[BULGE] += kernel * rise;
-        sum += level * kernel;
-        by_middle += level * by_place;
-        by_half += level * (by_place * u + kernel / half);
-        by_blur += level * (b0 * z0 - b1 * z1) * weight * sharp;
+        double u = of->place[i], rise = of->rise[i];
+        double kernel = right->below[i] - left->below[i], change = left->bell[i] - right->bell[i];
+        double light = guess[LEVEL] + guess[SLOPE] * u + bulge * rise;
+        by_level += kernel;
+        by_slope += kernel * u;
+        by_bulge += kernel * rise;
+        sum += light * kernel;
+        by_middle += light * change;
+        by_half += light * (change * sharp * u + kernel * over);
+        by_blur += light * (left->bell[i] * left->off[i] - right->bell[i] * right->off[i]);
     }
-    row[MIDDLE] = by_middle;
-    row[BLUR] = by_blur;
-    row[HALF] = by_half;
-    return sum;
+    row[LEVEL] = by_level * weight;
+    row[SLOPE] = by_slope * weight;
+    row[BULGE] = flat ? 0 : by_bulge * weight;
+    row[MIDDLE] = by_middle * weight * sharp;
+    row[BLUR] = by_blur * weight * sharp;
+    row[HALF] = by_half * weight;
+    return sum * weight;
 }
 
 /* The mean height of the surface over the columns that the profile averaged, and its mean place to the
@@ -174,11 +183,16 @@ static void compare(const eye_upright *u, const surface *of, const double *guess
 {
     double row[PARAMETERS], zone[3] = {0};
     int size[3] = {0};
+    border borders[2];
+    look_at_border(u->across_first + (from - 0.5) * u->step, guess, of, borders + from % 2);
     memset(out->normal, 0, sizeof out->normal);
     memset(out->right, 0, sizeof out->right);
     for (int i = from; i < to; i++) {
         double x = u->across_first + i * u->step;
-        double rest = u->across[i] - model_column(x, u->step, guess, of, flat, row);
+        const border *left = borders + i % 2;
+        border *right = borders + (i + 1) % 2;
+        look_at_border(x + 0.5 * u->step, guess, of, right);
+        double rest = u->across[i] - model_column(left, right, u->step, guess, of, flat, row);
         int at = x < guess[MIDDLE] - guess[HALF] ? 0 : x > guess[MIDDLE] + guess[HALF] ? 2 : 1;
         zone[at] += rest * rest;
         size[at]++;

@@ -69,6 +69,7 @@ void eye_lay_out(const eye_wave *wave, const double *guess, eye_layout *out)
     }
     out->reach = SHOWS * guess[EYE_BLUR];
     out->sharp = 1 / guess[EYE_BLUR];
+    out->share = 2 / (guess[EYE_UNIT] * wave->segments);
     out->passed = 0;
 }
 
@@ -86,7 +87,7 @@ double eye_wave_row(const eye_wave *wave, eye_layout *at, const double *guess, d
     double first = passed > 0 ? 1 : 0, last = passed > last_edge ? 1 : 0;
     double by_middle = 0, by_unit = 0, by_blur = 0, by_growth = 0, by_sag = 0;
     double off = (upper + lower) / 2 - guess[EYE_MIDDLE];
-    double shift = 2 * off / (guess[EYE_UNIT] * wave->segments);
+    double shift = off * at->share;
     shift = eye_limit(shift, -MOST_SHIFT, MOST_SHIFT);
     double light = guess[EYE_BRIGHT] + guess[EYE_BRIGHT_TILT] * shift;
     double shade = guess[EYE_DARK] + guess[EYE_DARK_TILT] * shift;

@@ -37,6 +37,7 @@ typedef struct {
     double place[EYE_MOST_EDGES], squeeze[EYE_MOST_EDGES];
     double reach; /* rows on either side of a boundary in which it shows */
     double sharp; /* 1 / blur */
+    double share; /* of half a code that a row is */
     int passed;   /* boundaries above the last row that no longer showed in it, */
     int shows;    /* and how many did */
 } eye_layout;

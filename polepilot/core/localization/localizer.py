@@ -268,12 +268,11 @@ class Localizer:
         on_trial = trial.failed
         if len(found.landmarks) == 2 and trial.refusal(stamp):
             return False
-        started = self._filter.copy()
-        sightings = self._marked(self._search.used)
-        refused = started.begin(found, stamp, sightings, self._history)
+        started, refused = self._started(stamp, found)
         track = Track(started, stamp, self.settings.tolerance)
-        share = 1.0 - len(refused) / max(len(sightings), 1)
-        if share < _FITTING or track.sigma > self.settings.degraded_sigma:
+        taken = [m for m in self._search.used if m not in refused]
+        fitting = len(taken) >= _FITTING * len(self._search.used) and self._search.confirmed(taken)
+        if not fitting or track.sigma > self.settings.degraded_sigma:
             # The stricter gate left some of them out: they do not fit together so well.
             self._search.refuse("The landmarks seen so far do not fit together well enough.")
             return False
@@ -282,24 +281,51 @@ class Localizer:
         agreed = [n for n in found.landmarks if not _mostly(n, refused, self._search.used)]
         if len(agreed) < 2:
             agreed = list(found.landmarks)
-        trial.begin(agreed, self._search.used)
-        outsiders, before = self._search.appearing(found, stamp, agreed), self._filter
+        trial.begin(agreed, self._search.of(agreed))
+        # Of a landmark that was seen before all others the robot may have been taken away.
+        since = -math.inf if on_trial else taken[0].stamp
+        outsiders = [
+            ((m, self._landmarks[m.landmark]), place, sigma)
+            for m, place, sigma in self._search.appearing(found, stamp, agreed)
+            if m.stamp >= since
+        ]
+        before, agreeing = self._filter, self._marked(taken)
         self._accept(track)
         books.open(stamp, agreed)
-        # Of a landmark that was seen before all others the robot may have been taken away.
-        since = -math.inf if on_trial else self._search.used[0].stamp
-        against = [
-            ((m, self._landmarks[m.landmark]), place)
-            for m, place, sigma in outsiders
-            if m.stamp >= since and books.displaced(m, place, sigma)
-        ]
-        track.supposed.start(before, found, stamp, sightings, against, self._history)
+        displaced = {
+            seen.landmark
+            for seen, place, sigma in track.supposed.start(
+                before, found, stamp, agreeing, outsiders, self._history
+            )
+            if books.displaced(seen, place, sigma)
+        }
+        track.supposed.keep(displaced)
         self._measured = (stamp, found.pose)
         ids = ", ".join(str(number) for number in found.landmarks)
         code = "refixed" if self._fixes else "fixed"
         self._fixes += 1
         self._events.add(LocalizerEvent(stamp, code, f"Pose fixed by landmarks {ids}."))
         return True
+
+    def _started(self, stamp: float, found: Fix) -> tuple[Filter, list[RangeBearing]]:
+        """A filter that begins with a fix, and which of the sightings behind that it refuses.
+
+        A filter believes what it is told first. Where it refuses too much of what follows, the
+        first pictures may be those that were wrong: the robot was still in somebody's hands. So
+        they are left out one by one, as long as enough are left.
+        """
+        used = self._search.used
+        most = (1.0 - _FITTING) * len(used)
+        first = 0
+        while True:
+            started = self._filter.copy()
+            against = started.begin(found, stamp, self._marked(used[first:]), self._history)
+            refused = [*used[:first], *against]
+            begun = used[first].stamp
+            while first < len(used) and used[first].stamp == begun:
+                first += 1
+            if len(refused) <= most or first > most:
+                return started, refused
 
     def _accept(self, track: Track) -> None:
         """Believe a pose."""

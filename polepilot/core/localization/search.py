@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from polepilot.core.geometry import Point, Pose2D
@@ -60,6 +60,15 @@ class FixSearch:
         if math.isfinite(measurement.range) and math.isfinite(measurement.range_sigma):
             self._sightings.append(measurement)
 
+    def of(self, numbers: Collection[int]) -> list[RangeBearing]:
+        """All sightings of these landmarks that are kept, whether a fix has used them or not."""
+        return [sighting for sighting in self._sightings if sighting.landmark in numbers]
+
+    def confirmed(self, sightings: Iterable[RangeBearing]) -> bool:
+        """Whether two landmarks at least were seen as often as one has to be to count."""
+        counts = Counter(sighting.landmark for sighting in sightings)
+        return sum(count >= self.confirmations for count in counts.values()) >= 2
+
     def attempts(self, stamp: float) -> Iterator[Fix]:
         """Confirmed poses at ``stamp``, each with the sightings behind it in ``used``.
 
@@ -97,8 +106,8 @@ class FixSearch:
         return chosen
 
     def _attempt(self, stamp: float, chosen: list[RangeBearing]) -> Fix | None:
-        counts = Counter(sighting.landmark for sighting in chosen)
-        if sum(count >= self.confirmations for count in counts.values()) < 2:
+        if not self.confirmed(chosen):
+            counts = Counter(sighting.landmark for sighting in chosen)
             if len(counts) == 1:
                 number = next(iter(counts))
                 reason = f"Only landmark {number} has been seen: a fix needs two."

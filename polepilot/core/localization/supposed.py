@@ -8,7 +8,7 @@ learns of pose, steering and speed moves the place that it has found as well.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ from polepilot.core.geometry import Point
 from polepilot.core.landmark import Landmark
 from polepilot.core.localization.fix import Fix
 from polepilot.core.localization.odometry import Following, OdometryHistory
+from polepilot.core.observation import RangeBearing
 
 if TYPE_CHECKING:
     from polepilot.core.localization.track import Filter, Sighting
@@ -58,27 +59,48 @@ class Supposed:
         found: Fix,
         stamp: float,
         agreeing: Sequence[Sighting],
-        against: Sequence[tuple[Sighting, Point]],
+        outsiders: Sequence[tuple[Sighting, Point, float]],
         history: OdometryHistory,
-    ) -> None:
-        """A pose was found at ``stamp``; landmarks that contradict it are followed from there.
+    ) -> list[tuple[RangeBearing, Point, float]]:
+        """A pose was found at ``stamp``; landmarks that had no part in it are followed from there.
 
         Args:
             before: the filter without that pose.
             found: the pose.
             stamp: its moment.
             agreeing: the sightings behind it.
-            against: those that contradict it, and where they put their landmarks.
+            outsiders: those of other landmarks, where they put them in `map`, and how well dead
+                reckoning alone knows that, metres.
             history: how the robot moved between them.
+
+        Returns:
+            the same, as the filter has it: it carries sightings along with all that it has learnt
+            of speed and steering, and the landmarks that came after them tell how the robot drove.
         """
-        places = {sighting[1]: place for sighting, place in against}
+        places = {sighting[1]: place for sighting, place, _ in outsiders}
+        learnt: dict[int, tuple[Point, float]] = {}
         for mark, place in places.items():
             copy = before.supposing(mark, place)
-            if copy is not None and len(self._copies) < _MOST:
-                seen = [sighting for sighting, _ in against if sighting[1] is mark]
-                both = sorted([*agreeing, *seen], key=lambda one: one[0].stamp)
-                copy.begin(found, stamp, both, history)
+            if copy is None:
+                continue
+            seen = [sighting for sighting, *_ in outsiders if sighting[1] is mark]
+            both = sorted([*agreeing, *seen], key=lambda one: one[0].stamp)
+            refused = copy.begin(found, stamp, both, history)
+            shift = copy.shift_of(mark.id)
+            # One that is here and there has no place.
+            if shift is not None and 2 * sum(m.landmark == mark.id for m in refused) <= len(seen):
                 self._copies[mark.id] = _Copy(copy, stamp)
+                (dx, dy), sigma = shift
+                learnt[mark.id] = (mark.x + dx, mark.y + dy), sigma
+        return [
+            (sighting, *learnt.get(sighting.landmark, (place, sigma)))
+            for (sighting, _), place, sigma in outsiders
+        ]
+
+    def keep(self, numbers: Collection[int]) -> None:
+        """Follow only these, and no more at once than is affordable."""
+        kept = [number for number in self._copies if number in numbers][:_MOST]
+        self._copies = {number: self._copies[number] for number in kept}
 
     def follow(
         self,

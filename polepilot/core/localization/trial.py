@@ -91,15 +91,15 @@ class Trial:
         """A third landmark is still to say whether the two are right."""
         return not self.over and len(self.landmarks) >= 3
 
-    def begin(self, fixed_by: Collection[int], used: Sequence[RangeBearing] = ()) -> None:
-        """``used``: the sightings that led to the pose."""
+    def begin(self, fixed_by: Collection[int], seen: Sequence[RangeBearing] = ()) -> None:
+        """``seen``: their sightings up to now, those that did not lead to the pose as well."""
         self.fixed_by = frozenset(fixed_by)
         self.pivots = set() if self.over else set(fixed_by)
         self._third.clear()
         if self.over:
             self.failures.clear()
         self.against.clear()
-        self.led[:] = () if self.over else used
+        self.led[:] = () if self.over else seen[-_MOST:]
         self.failed = False
 
     def give_up(self) -> list[RangeBearing]:

@@ -238,6 +238,16 @@ def test_a_fix_waits_for_a_second_look() -> None:
     assert estimate.pose.distance_to((-FORWARD, 0.0)) < 1e-3
 
 
+def test_what_was_seen_from_somebodys_hands_does_not_keep_the_rest_from_a_fix() -> None:
+    localizer = Localizer(MARKS, Vehicle(), FORWARD)
+    localizer.add_measurements([sight(0.0, 2, x=0.03, y=0.09)])
+    for index in range(1, 4):
+        localizer.add_measurements([sight(0.1 * index, 1), sight(0.1 * index, 2)])
+    estimate = localizer.estimate(0.3)
+    assert estimate is not None
+    assert estimate.pose.distance_to((-FORWARD, 0.0)) < 1e-3
+
+
 def test_a_single_outlier_changes_nothing() -> None:
     localizer = standing()
     before = localizer.estimate(1.0)

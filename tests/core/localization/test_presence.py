@@ -76,6 +76,30 @@ def test_what_is_not_seen_for_long_is_hidden_until_it_is_seen() -> None:
     assert not presence.saw(1, 4.0, 0.0, HERE)
 
 
+def test_what_is_hardly_ever_read_from_so_far_away_is_not_hidden() -> None:
+    """At the end of what the camera resolves, one look in eight tells."""
+    marks = {1: Landmark(1, 14.0, 0.0), 2: Landmark(2, 0.0, 14.0)}
+    presence = Presence(marks, 0.1, HALF_VIEW)
+    for number in marks:
+        presence.saw(number, 1.0, 0.0, Pose2D(5.0, 5.0, 0.0))
+    reports = []
+    for index in range(320):
+        pose = Pose2D(0.002 * index, 0.0, 0.0)
+        if index % 16 == 0:
+            presence.saw(2 if index % 32 else 1, 13.9, 0.0, pose)
+        else:
+            for pan in (0.0, math.pi / 2):
+                reports += presence.look(0.3 * index, pose, pan, set())[2]
+    assert reports == []
+    # One that is as far and was read every time is missed as before.
+    steady = Presence(marks, 0.1, HALF_VIEW)
+    steady.saw(1, 1.0, 0.0, Pose2D(5.0, 5.0, 0.0))
+    for index in range(50):
+        steady.saw(1, 13.9, 0.0, Pose2D(-0.1 * index, 0.0, 0.0))
+    found = [steady.look(10.0 + index, Pose2D(1.0, 0.0, 0.0), 0.0, set())[2] for index in range(14)]
+    assert [1] in found
+
+
 def test_a_wrong_pose_takes_its_expectations_with_it() -> None:
     presence = used()
     presence.forget()

@@ -21,6 +21,8 @@
 #define ROWS_APART 3       /* every third row is asked for faint colour */
 #define FAINT_GAP (GAP / ROWS_APART * ROWS_APART)
 #define LEAST_DEPTH 9.0f   /* grey levels of a valley */
+#define ASIDE 5            /* columns from a far landmark's middle, blurred colour included, to either side */
+#define MOST_ASIDE 4       /* one row of so many may have colour there */
 #define MOST_SUMS (3 * LONGEST + 32)
 
 /* Puts something behind a running sum: whoever takes four of its numbers at once finds it. */
@@ -122,6 +124,44 @@ static int is_known(const eye_hits *hits, int known, int x, int from, int end)
     return 0;
 }
 
+/* How many rows between two have at least faint colour, of those asked. */
+static int count_faint(const eye_hits *hits, int x, int from, int end, int apart)
+{
+    const eye_picture *p = hits->picture;
+    const uint8_t *column = p->pixels + (ptrdiff_t)p->channels * x;
+    int count = 0;
+    for (int y = from; y <= end; y += apart)
+        count += eye_colour(column + y * p->stride, hits->task) > EYE_FAINT;
+    return count;
+}
+
+/* Notes a stretch of colour in column ``x`` in which no code was found, if it is as high and as narrow as a
+ * far one, has end bars, and its light (a running sum over ``height`` rows) valleys: as a candidate without a
+ * code, as whole codes may be weighed there. */
+static void note_stretch(eye_hits *hits, int x, int from, int end, const float *sum, int height)
+{
+    int rows = end - from + 1, asked = (rows + ROWS_APART - 1) / ROWS_APART;
+    if (x < ASIDE || x + ASIDE >= hits->picture->columns)
+        return;
+    for (int b = 0; b < hits->n_bits && hits->n_hits < EYE_MOST_HITS; b++) {
+        float unit = (float)rows / (float)(2 * hits->bits[b] + 5);
+        int bar = (int)(2 * unit);
+        if (unit < EYE_SHORTEST || unit >= (float)EYE_FEW_ROWS ||
+            count_faint(hits, x, from, from + bar - 1, 1) < bar ||
+            count_faint(hits, x, end - bar + 1, end, 1) < bar ||
+            MOST_ASIDE * count_faint(hits, x - ASIDE, from, end, ROWS_APART) > asked ||
+            MOST_ASIDE * count_faint(hits, x + ASIDE, from, end, ROWS_APART) > asked ||
+            !has_valleys(sum, height))
+            continue;
+        hits->hits[hits->n_hits++] = (eye_hit){
+            .column = (float)x,
+            .top = (float)from - 0.5f + 2 * unit,
+            .bottom = (float)end + 0.5f - 2 * unit,
+            .bits = (int16_t)hits->bits[b],
+        };
+    }
+}
+
 static int peak_of(const uint8_t *signal, int from, int end)
 {
     uint8_t peak = 0; /* a byte: many at a time */
@@ -148,9 +188,11 @@ void eye_match_comb(eye_hits *hits, const uint8_t *signal, int first, int last, 
         int top = from < BESIDE ? 0 : from - BESIDE;
         int bottom = end + BESIDE + 1 < rows ? end + BESIDE + 1 : rows;
         sum_signal(signal, top, bottom, sum);
-        match_stretch(hits, sum, top, bottom, from, end, height + HIDDEN, x);
+        int found = match_stretch(hits, sum, top, bottom, from, end, height + HIDDEN, x);
         sum_brightness(hits, x, top, bottom, sum);
-        match_stretch(hits, sum, top, bottom, from, end, height + HIDDEN, x);
+        found += match_stretch(hits, sum, top, bottom, from, end, height + HIDDEN, x);
+        if (!found)
+            note_stretch(hits, x, from, end, sum, bottom - top);
     }
 }
 
@@ -187,6 +229,20 @@ static int end_of_faint(const eye_hits *hits, const uint8_t *column, int from)
     return end;
 }
 
+/* What `note_stretch` does, of all that has at least faint colour between two rows. */
+static void note_faint_stretch(eye_hits *hits, int x, int top, int bottom, const float *sum)
+{
+    const eye_picture *p = hits->picture;
+    const uint8_t *column = p->pixels + (ptrdiff_t)p->channels * x;
+    int rows = bottom - top;
+    while (top < bottom && eye_colour(column + top * p->stride, hits->task) <= EYE_FAINT)
+        top++;
+    while (bottom > top && eye_colour(column + (bottom - 1) * p->stride, hits->task) <= EYE_FAINT)
+        bottom--;
+    if (bottom > top)
+        note_stretch(hits, x, top, bottom - 1, sum, rows);
+}
+
 /* Codes in column ``x`` that have hardly any colour left, somewhere: by their brightness. That takes
  * long, so it ends when a picture speckled with colour has used up what a landmark may cost. */
 void eye_match_faint(eye_hits *hits, int x)
@@ -206,10 +262,11 @@ void eye_match_faint(eye_hits *hits, int x)
         int room = LONGEST - height + BESIDE;
         int top = from < room ? 0 : from - room;
         int bottom = end + room + 1 < p->rows ? end + room + 1 : p->rows;
-        sum_brightness(hits, most_coloured(hits, x, top, bottom), top, bottom, sum);
-        if (has_valleys(sum, bottom - top)) {
-            hits->slides -= hits->n_bits;
-            match_stretch(hits, sum, top, bottom, from, end, LONGEST, x);
-        }
+        int best = most_coloured(hits, x, top, bottom);
+        sum_brightness(hits, best, top, bottom, sum);
+        int valleys = has_valleys(sum, bottom - top);
+        hits->slides -= valleys ? hits->n_bits : 0;
+        if (valleys && !match_stretch(hits, sum, top, bottom, from, end, LONGEST, x))
+            note_faint_stretch(hits, best, top, bottom, sum);
     }
 }

@@ -20,14 +20,14 @@
 #define USUAL_TINT 0.17        /* as in eye_strip, */
 #define USUAL_SHARP_TINT 0.28  /* and where colour is blurred: beside the strip and between its segments */
 #define USUAL_SIGMA 0.0040      /* of the unit, as a share of it */
+#define MOST_SIGMA 0.05         /* the same: more is no range */
 #define LEAST_APART 1.4         /* of bright - dark, from what is beside it: what is missing is a */
 #define USUAL_APART 0.3         /* misfit, in this, */
 #define MISFIT_APART 3.0        /* and what is more makes up for so much of one, */
 #define MOST_APART 2.0          /* up to this much */
 #define SURE 6e-4              /* share of the unit: no second fit makes it better */
 #define SHARP 5.0              /* rows per segment: blurred colour still parts them */
-#define FEW_ROWS 3.0           /* per segment: codes are weighed as a whole, */
-#define BLURRED 2.4            /* and even pixels blur segments */
+#define BLURRED 2.4            /* rows per segment: even pixels blur them */
 #define MOST_WEIGHS 3          /* in one picture: it takes as long as all else of a candidate */
 #define UNREAD (-1.0)          /* instead of a tint: not every segment reads by itself */
 #define NEAR 7.5               /* rows per segment: from here on strips fit well, */
@@ -61,17 +61,22 @@ static double half_width(const eye_task *task, const eye_kind *kind, double unit
     return task->constant * radius / sqrt(away * away - radius * radius);
 }
 
-/* How badly everything together fits a landmark: squares of what the edges, the sides, the sag and
- * the tint are off, and of how vague the scale is, each over what it usually is. Real strips seldom
- * have more than a few. */
-static double misfit(const eye_strip *strip, double constant, int sharp)
+/* How badly the edges fit a landmark: squares of what they leave over and of how vague the scale is, each
+ * over what it usually is. Real strips seldom have more than a few. */
+static double misfit_along(const eye_strip *strip)
+{
+    double edges = strip->noise / USUAL_NOISE, vague = strip->unit_sigma / USUAL_SIGMA;
+    return edges * edges + vague * vague;
+}
+
+/* The same of the sides, the sag and the tint. */
+static double misfit_besides(const eye_strip *strip, double constant, int sharp)
 {
     double sag = hypot(strip->sag_sigma, USUAL_PITCH * strip->unit / constant);
-    double edges = strip->noise / USUAL_NOISE, sides = strip->side_noise / USUAL_SIDE_NOISE;
+    double sides = strip->side_noise / USUAL_SIDE_NOISE;
     double tint = strip->tint > 0 ? strip->tint / (sharp ? USUAL_SHARP_TINT : USUAL_TINT) : 0;
     double bend = strip->sag / (USUAL_BEND * sag);
-    double vague = strip->unit_sigma / USUAL_SIGMA;
-    return edges * edges + sides * sides + bend * bend + tint * tint + vague * vague;
+    return sides * sides + bend * bend + tint * tint;
 }
 
 /* How much of that a code may have: of a far one every bright bit more is evidence that it is one. */
@@ -188,6 +193,8 @@ static int examine(const eye_picture *picture, const eye_task *task,
     out->unit = (candidate->bottom - candidate->top) / (segments - 4);
     out->width = thick * out->unit;
     eye_encode(candidate->id, candidate->bits, out->code);
+    if (candidate->id == 0)
+        return EYE_NO_CODE;
     int reason =
         read_candidate(picture, task, candidate, thick, sharp, &upright, &scale, levels, &seen,
                        out);
@@ -228,7 +235,8 @@ static int examine(const eye_picture *picture, const eye_task *task,
     /* The bearing is that of the middle row, and the lean has to tell where the strip is there. */
     double away = picture->rows / 2.0 - upright.bright_row;
     out->column_sigma = hypot(side.sigma, upright.lean_sigma * away);
-    double bad = misfit(out, task->constant, sharp), most = most_misfit(out);
+    double along = misfit_along(out), bad = misfit_besides(out, task->constant, sharp);
+    double most = most_misfit(out);
     double apart = eye_apart(picture, &upright, &scale, &side, out->code, segments) - LEAST_APART;
     if (apart < 0)
         bad += apart * apart / (USUAL_APART * USUAL_APART);
@@ -236,11 +244,16 @@ static int examine(const eye_picture *picture, const eye_task *task,
         most += MISFIT_APART * fmin(apart, MOST_APART);
     out->unit_sigma = hypot(scale.unit_sigma, scale.unit_doubt);
     out->sag_sigma = hypot(scale.sag_sigma, scale.sag_doubt);
+    /* What the edges leave over the odds have counted already, if they are that code's: if its segments, read
+     * one by one, say so too. */
+    int agree = out->tint != UNREAD && scale.unit_sigma < MOST_SIGMA;
     /* Half of the squares are the logarithm by which normal errors make a strip less likely. */
-    if (candidate->settled && apart >= USUAL_APART && (bad + doubt) / 2 <= candidate->odds) {
+    if (candidate->settled && apart >= USUAL_APART &&
+        (bad + doubt + (agree ? 0 : along)) / 2 <= candidate->odds) {
         out->tint = fmax(out->tint, 0);
         return EYE_READ;
     }
+    bad += along;
     if (!(bad <= most) || out->tint == UNREAD) /* or no number */
         return EYE_POOR_FIT;
     /* What makes it the likelier a code says nothing of its bars. */
@@ -255,9 +268,9 @@ static int may_be_read(const eye_picture *picture, const eye_task *task,
     switch (strip->reason) {
     case EYE_READ:
     case EYE_COVERED:
-    case EYE_NO_BAR:
     case EYE_GOES_ON:
         return 0;
+    case EYE_NO_BAR:
     case EYE_NO_CONTRAST:
     case EYE_NO_SCALE:
         return unit < SHARP && eye_has_blurred_colour(picture, task, candidate);
@@ -279,7 +292,7 @@ static eye_strip look_closely(const eye_picture *picture, const eye_task *task,
     strip.reason = examine(picture, task, candidate, 0, &strip);
     if (!may_be_read(picture, task, candidate, &strip, unit))
         return strip;
-    if (unit < FEW_ROWS &&
+    if (unit < EYE_FEW_ROWS &&
         ((*weighs)-- <= 0 ||
          !eye_weigh_codes(picture, task, thickest(task, candidate->bits), &likeliest)))
         return strip;

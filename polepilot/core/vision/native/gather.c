@@ -47,9 +47,11 @@ static int by_value(const void *a, const void *b)
 static int belongs(const eye_hits *hits, const group *one, const eye_hit *h)
 {
     const eye_hit *last = hits->hits + one->last;
+    if (h->column - one->right > 2 * EYE_APART || one->bits != h->bits)
+        return 0;
     float room = 0.5f * (h->bottom - h->top) / (float)(2 * h->bits + 1) + 1.0f;
-    return one->bits == h->bits && h->column - one->right <= 2 * EYE_APART &&
-           fabsf(h->top - last->top) <= room && fabsf(h->bottom - last->bottom) <= room;
+    return fabsf(h->top - last->top) <= room && fabsf(h->bottom - last->bottom) <= room &&
+           (last->id == 0) == (h->id == 0);
 }
 
 /* Puts every hit into a group; returns how many groups there are. */
@@ -107,12 +109,12 @@ static eye_candidate candidate_of(const eye_hits *hits, int number, workspace *w
     };
 }
 
-/* Whether two candidates are one landmark, torn in two by a column that was misread. */
+/* Whether two candidates are one landmark, torn in two by a column that was misread or not read. */
 static int is_same(const eye_candidate *one, const eye_candidate *other)
 {
     double room = 0.08 * (other->bottom - other->top) + 2.0;
-    return one->bits == other->bits && one->id == other->id && fabs(one->top - other->top) < room &&
-           fabs(one->bottom - other->bottom) < room &&
+    return one->bits == other->bits && (one->id == other->id || one->id == 0) &&
+           fabs(one->top - other->top) < room && fabs(one->bottom - other->bottom) < room &&
            fabs(one->column - other->column) < 2 * room;
 }
 

@@ -10,12 +10,13 @@
 #define EYE_LIGHTS 4         /* what is known of a segment: three channels and */
 #define EYE_LIGHT 3          /* the brightness */
 #define EYE_FAINTEST 16      /* grey levels of colour that are none */
+#define EYE_FEW_ROWS 3.0     /* per segment: codes are weighed as a whole */
 
 /* ---- the steps ---- */
 
 /* Neighbouring columns that show one code, good to about a pixel. */
 typedef struct {
-    int bits, id;
+    int bits, id;              /* id 0: a mere stretch of colour, as high and narrow as a far one */
     double column;
     double top, bottom;        /* the inner borders of the end bars: after segment 2, before N - 2 */
     int evidence;              /* contrast, summed up over the columns that agreed */

@@ -411,7 +411,7 @@ static void try_about(field *f, spot about, double unit, int bits, const reach *
 /* Looks for the likeliest code, from where a candidate is upwards; 0 where there is no trace of one. */
 static int climb(field *f, spot here, int bits, likeliest *best)
 {
-    static const reach seed = {1, 0, 0, 1, 0, 2, 0}, near = {1, 1, 1, 1, 0, 2, 0},
+    static const reach seed = {1, 0, 1, 1, 0, 2, 0}, near = {1, 1, 1, 1, 0, 2, 0},
                        aslant = {1, 0, 0, 1, 1, 1, 1}, fine = {0.5, 1, 1, 0, 0, 1, 1};
     double unit = here.unit, before = -1;
     try_about(f, here, unit, bits, &seed, best);
